@@ -1,0 +1,211 @@
+"""What answers a run: the oracle protocol and two ways to write one."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, is_dataclass
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..designs.base import Design
+from ..factors import FactorSpace
+from ..runs import Response, Runs, Status
+
+CHUNK = 256
+"""Points per compiled batch. Fixed, so that one shape is compiled and a point's answer never depends on its batch."""
+
+
+class Answers(NamedTuple):
+    """Raw answers: values (n, n_responses), one status and one reason per point."""
+
+    values: NDArray[np.float64]
+    status: list[Status]
+    reasons: list[str]
+
+
+@dataclass(frozen=True, eq=False)
+class PublishedMap:
+    """A linear map that somebody published, to hold the fitted one against.
+
+    Parameters
+    ----------
+    source : str
+        Author, year, equation.
+    responses, factors : tuple of str
+        Names of rows and columns.
+    values : ndarray, shape (n_responses, n_factors)
+        Published entries, response unit per factor unit, SI.
+    notes : mapping of (response, factor) to str
+        Entries known to be misprinted, and why.
+    remarks : tuple of str
+        What else a reader must know of the source.
+    """
+
+    source: str
+    responses: tuple[str, ...]
+    factors: tuple[str, ...]
+    values: NDArray[np.float64]
+    notes: Mapping[tuple[str, str], str]
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """One polyline of a mechanism: `points` and their `displacement`, both (n, 3) in m."""
+
+    name: str
+    points: NDArray[np.float64]
+    displacement: NDArray[np.float64]
+    rigid: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Arrow:
+    """A load or drive: where it acts (3,) in m, how that point moves (3,) in m, and its unit direction (3,)."""
+
+    label: str
+    point: NDArray[np.float64]
+    displacement: NDArray[np.float64]
+    direction: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A mechanism at rest and displaced, for drawing."""
+
+    lines: tuple[Line, ...]
+    arrows: tuple[Arrow, ...] = ()
+
+
+class Oracle(ABC):
+    """Answers a batch of points with a batch of responses and a status each.
+
+    A subclass is usually a frozen dataclass whose fields are its parameters. The law: the same
+    parameters and point give the same answer, whatever else is in the batch.
+
+    Attributes
+    ----------
+    name, summary, source : str
+        What it is called, what it answers, where the physics comes from.
+    version : str
+        Raised whenever the answers change.
+    resolution : float
+        Relative: differences below this fraction of a response's largest value are rounding.
+    """
+
+    name: ClassVar[str]
+    summary: ClassVar[str] = ""
+    source: ClassVar[str] = ""
+    version: ClassVar[str] = "1"
+    resolution: ClassVar[float] = 0.0
+
+    @property
+    @abstractmethod
+    def factors(self) -> FactorSpace:
+        """Factors with their default ranges."""
+
+    @property
+    @abstractmethod
+    def responses(self) -> tuple[Response, ...]:
+        """Responses, n_responses of them."""
+
+    @abstractmethod
+    def evaluate(self, points: NDArray[np.float64]) -> Answers:
+        """Answer points in physical units, shape (n, n_factors)."""
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Inputs held fixed, as plain JSON-able values."""
+        return asdict(self) if is_dataclass(self) and not isinstance(self, type) else {}
+
+    @property
+    def published(self) -> PublishedMap | None:
+        """A published map of the same mechanism, if there is one for these parameters."""
+        return None
+
+    def shape(self, point: ArrayLike) -> Shape | None:
+        """The mechanism displaced at `point`, shape (n_factors,), if it can be drawn."""
+        return None
+
+    def __call__(self, design: Design) -> Runs:
+        """Run a design: one answer, status and reason per row.
+
+        Raises
+        ------
+        ValueError
+            If the design's factors are not this oracle's, in name, unit and order.
+        """
+        if design.space.labels != self.factors.labels:
+            raise ValueError(
+                f"oracle {self.name!r} has the factors {', '.join(self.factors.labels)}; "
+                f"the design has {', '.join(design.space.labels)}"
+            )
+        values, status, reasons = self.evaluate(design.physical)
+        values = np.array(values, dtype=np.float64)
+        for i in np.flatnonzero(~np.isfinite(values).all(axis=1)):
+            if status[i] is Status.OK:
+                bad = [r.name for r, v in zip(self.responses, values[i], strict=True) if not np.isfinite(v)]
+                status[i], reasons[i] = Status.NON_FINITE, f"{', '.join(bad)} not finite"
+        return Runs(design, self.responses, values, tuple(status), tuple(reasons))
+
+
+class PointOracle(Oracle):
+    """An oracle in plain Python: one point in, one answer out. An exception fails its point, not the batch."""
+
+    @abstractmethod
+    def respond(self, point: NDArray[np.float64]) -> ArrayLike:
+        """Responses (n_responses,) at `point`, shape (n_factors,)."""
+
+    def evaluate(self, points: NDArray[np.float64]) -> Answers:
+        """Answer point by point."""
+        values = np.full((len(points), len(self.responses)), np.nan)
+        status, reasons = [Status.OK] * len(points), [""] * len(points)
+        for i, point in enumerate(points):
+            try:
+                values[i] = self.respond(point)
+            except Exception as error:
+                status[i], reasons[i] = Status.CRASHED, f"{type(error).__name__}: {error}"
+        return Answers(values, status, reasons)
+
+
+class JaxOracle(Oracle):
+    """An oracle in JAX: write one traceable point, get batches and Jacobians in float64."""
+
+    @abstractmethod
+    def respond(self, point: Any) -> Any:
+        """Responses (n_responses,) at `point`, shape (n_factors,); traceable by JAX."""
+
+    def evaluate(self, points: NDArray[np.float64]) -> Answers:
+        """Answer in padded batches of :data:`CHUNK`."""
+        values = _in_chunks(self._batched, points)
+        return Answers(values, [Status.OK] * len(points), [""] * len(points))
+
+    def jacobian(self, points: ArrayLike) -> NDArray[np.float64]:
+        """d response / d factor at `points` (n, n_factors), shape (n, n_responses, n_factors), SI."""
+        return _in_chunks(self._batched_jacobian, np.asarray(points, dtype=np.float64))
+
+    @cached_property
+    def _batched(self) -> Any:
+        import jax
+
+        return jax.jit(jax.vmap(self.respond))
+
+    @cached_property
+    def _batched_jacobian(self) -> Any:
+        import jax
+
+        return jax.jit(jax.vmap(jax.jacfwd(self.respond)))
+
+
+def _in_chunks(function: Any, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    import jax
+
+    answers = []
+    with jax.enable_x64(True):
+        for start in range(0, len(points), CHUNK):
+            chunk = points[start : start + CHUNK]
+            padded = np.vstack([chunk, np.repeat(chunk[-1:], CHUNK - len(chunk), axis=0)])
+            answers.append(np.asarray(function(padded))[: len(chunk)])
+    return np.concatenate(answers) if answers else np.empty((0, 0))
