@@ -1,0 +1,194 @@
+"""Inversion: the settings that give wanted responses, or a refusal with the nearest reachable ones."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from .model import Surrogate
+
+BOX_TOLERANCE = 1e-9
+"""How far outside [−1, 1] a coded setting may lie and still count as inside."""
+
+TARGET_TOLERANCE = 1e-9
+"""Largest mismatch of a reached target, as a fraction of the response's scale."""
+
+MAX_ITERATIONS = 50
+
+
+class InversionStatus(StrEnum):
+    """What became of one target."""
+
+    OK = "ok"
+    OUTSIDE = "outside"
+
+
+@dataclass(frozen=True, eq=False)
+class Inversion:
+    """Answers to an inversion, one row per target.
+
+    Parameters
+    ----------
+    settings : ndarray, shape (n, n_factors)
+        Settings in the factors' units; NaN where the target was refused.
+    status : tuple of InversionStatus
+        ``ok``, or ``outside``: no setting in the domain reaches the target.
+    nearest_settings : ndarray, shape (n, n_factors)
+        The settings that come nearest to the target; equal to `settings` where it was reached.
+    nearest : ndarray, shape (n, n_responses)
+        The model's responses there, SI: for a refused target the nearest reachable one, distance
+        measured with each response divided by its scale.
+    distance : ndarray, shape (n,)
+        That distance, dimensionless.
+    """
+
+    settings: NDArray[np.float64]
+    status: tuple[InversionStatus, ...]
+    nearest_settings: NDArray[np.float64]
+    nearest: NDArray[np.float64]
+    distance: NDArray[np.float64]
+
+    @property
+    def ok(self) -> NDArray[np.bool_]:
+        """Which targets were reached, shape (n,)."""
+        return np.array([s is InversionStatus.OK for s in self.status], dtype=bool)
+
+    def __array__(self, dtype: Any = None, copy: Any = None) -> NDArray[np.float64]:
+        return np.array(self.settings, dtype=dtype)
+
+
+@dataclass(frozen=True, eq=False)
+class AffineInverse:
+    """Closed-form inverse of an affine model: ``settings = gain @ responses + offset``.
+
+    Parameters
+    ----------
+    gain : ndarray, shape (n_factors, n_responses)
+        Factor unit per SI response unit. A least-squares inverse when there are more responses than
+        factors; the smallest change in coded units when there are fewer.
+    offset : ndarray, shape (n_factors,)
+        In the factors' units.
+    condition : float
+        Condition number of the map from coded factors to responses divided by their scale;
+        infinite if the map has lost rank.
+    """
+
+    gain: NDArray[np.float64]
+    offset: NDArray[np.float64]
+    condition: float
+
+
+def affine_inverse(model: "Surrogate") -> AffineInverse:
+    """The closed-form inverse of an affine model.
+
+    Raises
+    ------
+    ValueError
+        If the model has terms above degree one.
+    """
+    if not model.is_affine:
+        raise ValueError("only an affine model has a closed-form inverse; this one has terms above degree one")
+    centre, half = model.factors.centre, model.factors.half_range
+    constant, slope = _affine_part(model)
+    scaled = slope / model.scale[:, None]
+    inverse = np.linalg.pinv(scaled) / model.scale
+    gain = half[:, None] * inverse
+    singular = np.linalg.svd(scaled, compute_uv=False)
+    lost = singular[-1] <= max(scaled.shape) * np.finfo(float).eps * singular[0]
+    return AffineInverse(gain, centre - gain @ constant, np.inf if lost else float(singular[0] / singular[-1]))
+
+
+def invert(model: "Surrogate", targets: ArrayLike) -> Inversion:
+    """Find settings in the domain whose predicted responses are `targets`.
+
+    An affine model is inverted in closed form; any other by Gauss–Newton steps of least norm on the
+    polynomial with its analytic Jacobian, all targets at once. Where that leaves the box, the
+    nearest point of the box is sought; a target is refused only if even that misses it.
+
+    Parameters
+    ----------
+    model : Surrogate
+    targets : array_like, shape (n, n_responses)
+        Wanted responses, SI.
+
+    Raises
+    ------
+    ValueError
+        If `targets` has the wrong shape or a value that is not finite.
+    """
+    targets = np.asarray(targets, dtype=np.float64)
+    if targets.ndim != 2 or targets.shape[1] != len(model.responses):
+        names = ", ".join(r.name for r in model.responses)
+        raise ValueError(
+            f"targets must have shape (n, {len(model.responses)}), one column per response ({names}); "
+            f"got {targets.shape}"
+        )
+    if not np.isfinite(targets).all():
+        raise ValueError("targets must be finite")
+    coded = _gauss_newton(model, targets)
+    for i in np.flatnonzero(~_reached(model, coded, targets)):
+        coded[i] = _nearest_in_box(model, targets[i], coded[i])
+    ok = _reached(model, coded, targets)
+    coded = np.clip(coded, -1.0, 1.0)
+    nearest = model.predict_coded(coded)
+    settings = model.factors.decode(coded)
+    return Inversion(
+        np.where(ok[:, None], settings, np.nan),
+        tuple(InversionStatus.OK if k else InversionStatus.OUTSIDE for k in ok),
+        settings,
+        nearest,
+        np.linalg.norm((nearest - targets) / model.scale, axis=1),
+    )
+
+
+def _affine_part(model: "Surrogate") -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Value (n_responses,) and slope by coded factors (n_responses, n_factors) at the centre of the domain."""
+    centre = np.zeros((1, len(model.factors)))
+    return model.predict_coded(centre)[0], model.jacobian_coded(centre)[0]
+
+
+def _reached(model: "Surrogate", coded: NDArray[np.float64], targets: NDArray[np.float64]) -> NDArray[np.bool_]:
+    inside = (np.abs(coded) <= 1.0 + BOX_TOLERANCE).all(axis=1)
+    miss = np.abs(model.predict_coded(coded) - targets) / model.scale
+    return inside & (miss <= TARGET_TOLERANCE).all(axis=1)
+
+
+def _gauss_newton(model: "Surrogate", targets: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Coded settings after undamped least-norm steps from the centre; the first step of an affine model is exact."""
+    constant, slope = _affine_part(model)
+    first = np.linalg.pinv(slope / model.scale[:, None])
+    coded = (targets - constant) / model.scale @ first.T
+    if model.is_affine:
+        return coded
+    coded = np.clip(coded, -1.0, 1.0)
+    for _ in range(MAX_ITERATIONS):
+        miss = (targets - model.predict_coded(coded)) / model.scale
+        steps = np.linalg.pinv(model.jacobian_coded(coded) / model.scale[:, None])
+        step = np.einsum("nkr,nr->nk", steps, miss)
+        # Far outside the box the polynomial means nothing: keep the search near it.
+        coded = np.clip(coded + step, -2.0, 2.0)
+        if np.abs(step).max(initial=0.0) < 1e-14:
+            break
+    return coded
+
+
+def _nearest_in_box(model: "Surrogate", target: NDArray[np.float64], start: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The coded settings in the box whose responses come nearest to one target (locally, if not affine)."""
+    from scipy.optimize import least_squares, lsq_linear
+
+    if model.is_affine:
+        constant, slope = _affine_part(model)
+        scaled = slope / model.scale[:, None]
+        return lsq_linear(scaled, (target - constant) / model.scale, bounds=(-1.0, 1.0), tol=1e-14).x
+
+    def miss(coded: NDArray[np.float64]) -> NDArray[np.float64]:
+        return (model.predict_coded(coded[None])[0] - target) / model.scale
+
+    def slope_at(coded: NDArray[np.float64]) -> NDArray[np.float64]:
+        return model.jacobian_coded(coded[None])[0] / model.scale[:, None]
+
+    inside = np.clip(start, -1.0, 1.0)
+    return least_squares(miss, inside, slope_at, bounds=(-1.0, 1.0), xtol=1e-15, ftol=1e-15, gtol=1e-15).x
