@@ -44,13 +44,9 @@ class Factor:
             if isinstance(end, bool) or not isinstance(end, (int, float)) or not math.isfinite(end):
                 raise ValueError(f"factor {self.name!r}: low and high must be finite numbers, got {end!r}")
         if not self.low < self.high:
-            raise ValueError(
-                f"factor {self.name!r}: low must be below high, got low = {self.low}, high = {self.high}"
-            )
+            raise ValueError(f"factor {self.name!r}: low must be below high, got low = {self.low}, high = {self.high}")
         if not math.isfinite(self.high - self.low):
-            raise ValueError(
-                f"factor {self.name!r}: the range {self.low} to {self.high} is too wide for float64"
-            )
+            raise ValueError(f"factor {self.name!r}: the range {self.low} to {self.high} is too wide for float64")
 
     @property
     def label(self) -> str:

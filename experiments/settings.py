@@ -72,11 +72,7 @@ def _options(hint: Any) -> tuple[type, ...]:
 def _check_type(kind: str, key: str, value: Any, hint: Any) -> None:
     options = _options(hint)
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    fits = (
-        type(value) in options
-        or (float in options and is_number)
-        or (value is None and type(None) in options)
-    )
+    fits = type(value) in options or (float in options and is_number) or (value is None and type(None) in options)
     if not fits:
         words = {float: "a number", int: "a whole number", str: "a text", bool: "true or false"}
         wanted = " or ".join(words.get(o, o.__name__) for o in options if o is not type(None))

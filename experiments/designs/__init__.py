@@ -18,9 +18,7 @@ from .plackett_burman import PlackettBurman
 from .space_filling import LatinHypercube, Random
 from .uniform import Uniform
 
-METHODS: dict[str, type[DesignMethod]] = {
-    cls.method: cls for cls in (PlackettBurman, Uniform, LatinHypercube, Random)
-}
+METHODS: dict[str, type[DesignMethod]] = {cls.method: cls for cls in (PlackettBurman, Uniform, LatinHypercube, Random)}
 
 __all__ = [
     "METHODS",

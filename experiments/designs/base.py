@@ -42,8 +42,7 @@ class Design:
         coded = np.array(self.coded, dtype=np.float64)
         if coded.ndim != 2 or coded.shape[1] != len(self.space):
             raise ValueError(
-                f"a design of {len(self.space)} factors needs shape (n_runs, {len(self.space)}); "
-                f"got {coded.shape}"
+                f"a design of {len(self.space)} factors needs shape (n_runs, {len(self.space)}); got {coded.shape}"
             )
         if not np.isfinite(coded).all():
             raise ValueError("a design must not contain settings that are not finite")

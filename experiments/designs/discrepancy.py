@@ -30,9 +30,7 @@ def centred_discrepancy_squared(points: ArrayLike) -> float:
     """
     points = np.asarray(points, dtype=np.float64)
     if points.ndim != 2 or not ((points >= 0.0) & (points <= 1.0)).all():
-        raise ValueError(
-            f"points must be a table of shape (n, s) inside the unit cube; got shape {points.shape}"
-        )
+        raise ValueError(f"points must be a table of shape (n, s) inside the unit cube; got shape {points.shape}")
     n, s = points.shape
     once = np.ones(n)
     twice = np.ones((n, n))

@@ -79,6 +79,4 @@ def _smallest(n_factors: int) -> int:
     for n_runs in range(4, MAX_RUNS + 1, 4):
         if constructible(n_runs) and n_runs - 1 >= n_factors + MIN_DUMMIES:
             return n_runs
-    raise ValueError(
-        f"no Plackett-Burman design for {n_factors} factors: at most {MAX_RUNS - 1 - MIN_DUMMIES}"
-    )
+    raise ValueError(f"no Plackett-Burman design for {n_factors} factors: at most {MAX_RUNS - 1 - MIN_DUMMIES}")

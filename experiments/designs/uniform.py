@@ -74,9 +74,7 @@ class Uniform:
         return Design(space, -1.0 + 2.0 * chosen / (self.levels - 1), self.method)
 
 
-def anneal(
-    design: NDArray[np.int64], levels: int, budget: int, rng: np.random.Generator
-) -> NDArray[np.int64]:
+def anneal(design: NDArray[np.int64], levels: int, budget: int, rng: np.random.Generator) -> NDArray[np.int64]:
     """The design of lowest CD₂² met in `budget` exchanges, shape (n_runs, n_factors), levels 0 … levels − 1."""
     state = _State(design.copy(), levels)
     best, best_value = state.design.copy(), state.value()
@@ -125,9 +123,7 @@ class _State:
         kept = np.diag(rest)[:, None] * (here[None, :] + here[:, None] - 2.0 * own)
         met = rest * (2.0 * own - here[None, :] - here[:, None])
         change = (2.0 * (gain + gain.T) + kept + kept.T + 2.0 * met) / self.n**2
-        once = (self.once / self.single[level])[:, None] * (
-            self.single[level][None, :] - self.single[level][:, None]
-        )
+        once = (self.once / self.single[level])[:, None] * (self.single[level][None, :] - self.single[level][:, None])
         change -= 2.0 / self.n * (once + once.T)
         flat = change[self.first, self.second]
         flat[level[self.first] == level[self.second]] = np.inf
