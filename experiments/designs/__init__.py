@@ -8,10 +8,11 @@
 """
 
 from collections.abc import Mapping
+from math import ceil
 from typing import Any
 
 from ..naming import suggestion
-from ..settings import build
+from ..settings import build, describe
 from .base import Design, DesignMethod
 from .discrepancy import centred_discrepancy_squared, level_discrepancy_squared
 from .plackett_burman import PlackettBurman
@@ -34,8 +35,29 @@ __all__ = [
 ]
 
 
-def get(method: str, settings: Mapping[str, Any] | None = None) -> DesignMethod:
-    """The design method of that name with its settings; ``ValueError`` with the nearest name or setting if unknown."""
+def get(method: str, settings: Mapping[str, Any] | None = None, at_least: float | None = None) -> DesignMethod:
+    """The design method of that name with its settings.
+
+    Parameters
+    ----------
+    method : str
+    settings : mapping, optional
+        Its settings; defaults where not given.
+    at_least : float, optional
+        If `n_runs` is not among the settings: take the smallest allowed number of runs that is at
+        least this (a multiple of ``levels``, where the method has levels).
+
+    Raises
+    ------
+    ValueError
+        For an unknown method or setting (with the nearest known one), or a value that is refused.
+    """
     if method not in METHODS:
         raise ValueError(f"unknown design {method!r}{suggestion(method, METHODS)}")
-    return build(f"design {method!r}", METHODS[method], settings or {})
+    cls, chosen = METHODS[method], dict(settings or {})
+    if at_least is not None and "n_runs" not in chosen:
+        defaults = {row["name"]: row["default"] for row in describe(cls)}
+        levels = chosen.get("levels", int(defaults.get("levels", 1)))
+        step = levels if isinstance(levels, int) and levels > 0 else 1
+        chosen["n_runs"] = step * ceil(at_least / step)
+    return build(f"design {method!r}", cls, chosen)

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..factors import FactorSpace
 
-Seed = int | np.random.Generator | None
+Seed = int | np.random.SeedSequence | np.random.Generator | None
 
 
 @dataclass(frozen=True, eq=False)

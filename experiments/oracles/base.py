@@ -91,6 +91,8 @@ class Oracle(ABC):
         What it is called, what it answers, where the physics comes from.
     version : str
         Raised whenever the answers change.
+    batch : int
+        Points that are answered, and then stored, together.
     resolution : float
         Relative: differences below this fraction of a response's largest value are rounding.
     """
@@ -99,6 +101,7 @@ class Oracle(ABC):
     summary: ClassVar[str] = ""
     source: ClassVar[str] = ""
     version: ClassVar[str] = "1"
+    batch: ClassVar[int] = 1
     resolution: ClassVar[float] = 0.0
 
     @property
@@ -173,17 +176,30 @@ class PointOracle(Oracle):
 class JaxOracle(Oracle):
     """An oracle in JAX: write one traceable point, get batches and Jacobians in float64."""
 
+    batch: ClassVar[int] = CHUNK
+
     @abstractmethod
     def respond(self, point: Any) -> Any:
         """Responses (n_responses,) at `point`, shape (n_factors,); traceable by JAX."""
 
+    def prepare(self) -> None:
+        """Build once, outside of tracing, what every point needs: a mesh, a factorisation.
+
+        Raises
+        ------
+        ValueError
+            If the parameters describe something that cannot be built.
+        """
+
     def evaluate(self, points: NDArray[np.float64]) -> Answers:
         """Answer in padded batches of :data:`CHUNK`."""
+        self.prepare()
         values = _in_chunks(self._batched, points)
         return Answers(values, [Status.OK] * len(points), [""] * len(points))
 
     def jacobian(self, points: ArrayLike) -> NDArray[np.float64]:
         """d response / d factor at `points` (n, n_factors), shape (n, n_responses, n_factors), SI."""
+        self.prepare()
         return _in_chunks(self._batched_jacobian, np.asarray(points, dtype=np.float64))
 
     @cached_property

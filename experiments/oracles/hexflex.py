@@ -118,6 +118,10 @@ class HexFlex(JaxOracle):
         platform = RigidBody("platform", PIVOT, (*TABS, *roots))
         return Frame(nodes, tuple(members), (platform,), tuple(clamps))
 
+    def prepare(self) -> None:
+        """Factorise the frame."""
+        _ = self._solver, self._unit_loads
+
     def respond(self, point: Any) -> Any:
         """Pose (x, y, z [m], θx, θy, θz [rad]) of the centroid under the six forces [N]."""
         import jax.numpy as jnp
@@ -157,7 +161,7 @@ class HexFlex(JaxOracle):
     def _limb(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Root, bend and clamp of the first tab's right limb, in its plane."""
         root = np.array([self.root_offset, self.root_radius])
-        bend = root + [self.length_1, 0.0]
+        bend = root + np.array([self.length_1, 0.0])
         clamp = bend + self.length_2 * np.array([np.cos(self.bend_angle), np.sin(self.bend_angle)])
         return root, bend, clamp
 

@@ -1,0 +1,58 @@
+"""A mechanism at rest and displaced, in 3D: matplotlib axes in, axes out."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .base import Shape
+
+if TYPE_CHECKING:
+    from mpl_toolkits.mplot3d.axes3d import Axes3D
+
+REST, MOVED, RIGID, LOAD = "#cbd5e1", "#1d4ed8", "#0f172a", "#c2410c"
+
+
+def size(shape: Shape) -> float:
+    """Largest extent of the mechanism at rest, m."""
+    points = np.vstack([line.points for line in shape.lines])
+    return float(np.ptp(points, axis=0).max())
+
+
+def exaggeration(shape: Shape, visible: float = 0.15) -> float:
+    """A round factor (1, 2 or 5 times a power of ten) that shows the largest displacement as `visible` of the size."""
+    largest = max(float(np.linalg.norm(line.displacement, axis=1).max()) for line in shape.lines)
+    if largest == 0.0:
+        return 1.0
+    wanted = visible * size(shape) / largest
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return float(power * max(m for m in (1.0, 2.0, 5.0) if m * power <= wanted * (1.0 + 1e-9)))
+
+
+def draw_shape(ax: "Axes3D", shape: Shape, factor: float | None = None) -> "Axes3D":
+    """Draw the displaced mechanism, displacements times `factor`, over the mechanism at rest (in mm)."""
+    factor = exaggeration(shape) if factor is None else factor
+    for line in shape.lines:
+        ax.plot(*(1e3 * line.points.T), color=REST, lw=1.2, zorder=1)
+    for line in shape.lines:
+        color, width = (RIGID, 2.2) if line.rigid else (MOVED, 1.8)
+        ax.plot(*(1e3 * (line.points + factor * line.displacement).T), color=color, lw=width, zorder=2)
+    reach = 0.12 * size(shape)
+    for arrow in shape.arrows:
+        foot = 1e3 * (arrow.point + factor * arrow.displacement)
+        ax.quiver(*foot, *(1e3 * reach * arrow.direction), color=LOAD, lw=1.2, arrow_length_ratio=0.25)
+        ax.text(*(foot + 1.15e3 * reach * arrow.direction), arrow.label, color=LOAD, fontsize=7)
+    _equal_axes(ax, shape, factor)
+    ax.set(xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]")
+    return ax
+
+
+def _equal_axes(ax: Any, shape: Shape, factor: float) -> None:
+    points = 1e3 * np.vstack(
+        [p for line in shape.lines for p in (line.points, line.points + factor * line.displacement)]
+    )
+    span = np.maximum(np.ptp(points, axis=0), 0.2 * np.ptp(points, axis=0).max())
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    ax.set_xlim(middle[0] - span[0] / 2, middle[0] + span[0] / 2)
+    ax.set_ylim(middle[1] - span[1] / 2, middle[1] + span[1] / 2)
+    ax.set_zlim(middle[2] - span[2] / 2, middle[2] + span[2] / 2)
+    ax.set_box_aspect(span)

@@ -1,0 +1,227 @@
+"""The config: TOML parsed once into frozen settings, with one sentence for whatever is wrong."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tomli_w
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from experiments.naming import suggestion
+
+from .errors import InputError
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Setting = bool | int | Number | str
+
+
+class Table(BaseModel):
+    """A TOML table: frozen, strictly typed, and closed to unknown keys."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class FactorRange(Table):
+    """A range that replaces an oracle's default."""
+
+    low: Number = Field(description="low end, in the factor's unit")
+    high: Number = Field(description="high end, in the factor's unit")
+    unit: str | None = Field(None, description="the factor's unit, checked if given")
+
+
+class DesignTable(Table):
+    """A design method and its settings; ``flexdoce list`` names them."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, strict=True)
+    __pydantic_extra__: dict[str, Setting]
+
+    method: str = Field(description="name of the design method")
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The settings beside the method's name."""
+        return dict(self.__pydantic_extra__ or {})
+
+
+class OracleTable(Table):
+    """What answers the runs."""
+
+    name: str = Field(description="name of the oracle")
+    parameters: dict[str, Setting] = Field({}, description="oracle inputs held fixed; defaults where not given")
+    max_failed_fraction: float = Field(
+        0.0, ge=0.0, le=1.0, description="failed runs tolerated in the fit and the validation"
+    )
+
+
+class ScreeningTable(Table):
+    """Which factors act."""
+
+    design: DesignTable = Field(DesignTable(method="plackett_burman"), description="orthogonal two-level design")
+    alpha: float = Field(0.05, gt=0.0, lt=1.0, description="error rate of Lenth's margins")
+    keep: list[str] = Field([], description="factors kept whatever the screening says")
+
+
+class FitTable(Table):
+    """The polynomial and the design that it is fitted on."""
+
+    design: DesignTable = Field(
+        DesignTable(method="uniform"),
+        description="filling design; without n_runs it is sized from the factors that act",
+    )
+    degree: int = Field(2, ge=1, le=5, description="highest total degree of the candidate terms")
+    interactions: bool = Field(True, description="whether products of different factors are candidates")
+    trim: bool = Field(True, description="whether terms that the data do not support are removed")
+    runs_per_term: float = Field(
+        1.05, ge=1.0, le=100.0, description="runs per candidate term, where n_runs is not given"
+    )
+
+
+class ValidationTable(Table):
+    """Fresh random runs."""
+
+    n_runs: int = Field(1000, ge=2, le=10_000_000, description="uniform random runs in the whole box")
+
+
+class RequireTable(Table):
+    """What must hold; the command ends with exit code 4 if it does not."""
+
+    max_relative_error: float | None = Field(
+        None, gt=0.0, description="largest error on fresh runs over the response's range, every response"
+    )
+    certified_inverse: bool = Field(False, description="whether the inverse must be certified")
+
+
+class ExportTable(Table):
+    """Code generated from the model."""
+
+    targets: list[str] = Field(["c99"], description="export targets; flexdoce list names them")
+    prefix: str | None = Field(None, description="prefix of generated names; the study's name if not given")
+
+
+class Config(Table):
+    """A study, as written by a person."""
+
+    version: Literal[1] = Field(1, description="version of this format")
+    name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", description="short name: letters, digits, underscores")
+    title: str = Field("", description="one line for the report")
+    seed: int = Field(0, ge=0, le=2**63 - 1, description="seed of everything random")
+    oracle: OracleTable
+    factors: dict[str, FactorRange] = Field({}, description="ranges that replace the oracle's defaults")
+    screening: ScreeningTable = ScreeningTable()
+    fit: FitTable = FitTable()
+    validation: ValidationTable = ValidationTable()
+    require: RequireTable = RequireTable()
+    export: ExportTable = ExportTable()
+
+
+def load_config(path: str | Path, overrides: Sequence[str] = ()) -> Config:
+    """Read a config file and apply ``dotted.key=value`` overrides.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is not TOML, or a key or value is not allowed.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
+        raise InputError(f"cannot read the config {path}: {reason}") from None
+    return parse_config(text, str(path), overrides)
+
+
+def parse_config(text: str, origin: str = "config", overrides: Sequence[str] = ()) -> Config:
+    """As :func:`load_config`, from text; `origin` names it in messages."""
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{origin} is not valid TOML: {error}") from None
+    for override in overrides:
+        _apply(document, override)
+    try:
+        return Config.model_validate(document)
+    except ValidationError as error:
+        raise InputError(f"{origin}: {_sentence(error)}") from None
+
+
+def dump_config(config: Config) -> str:
+    """The config as resolved, in TOML; parsing it gives the same config."""
+    return tomli_w.dumps(config.model_dump(exclude_none=True))
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON schema of the config, for editors."""
+    schema = Config.model_json_schema()
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def _apply(document: dict[str, Any], override: str) -> None:
+    key, equals, value = override.partition("=")
+    parts = [p.strip() for p in key.split(".")]
+    if not equals or not all(parts):
+        raise InputError(f"--set {override!r} is not of the form dotted.key=value, such as fit.degree=3")
+    try:
+        parsed = tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        parsed = value.strip()
+    table: Any = document
+    for part in parts[:-1]:
+        table = table.setdefault(part, {})
+        if not isinstance(table, dict):
+            raise InputError(f"--set {override!r}: {part!r} is a value, not a table")
+    table[parts[-1]] = parsed
+
+
+def _sentence(error: ValidationError) -> str:
+    """The first problem, as one sentence that says where, what came and what is allowed."""
+    problems = error.errors()
+    first = next((p for p in problems if p["type"] == "extra_forbidden"), problems[0])
+    where = ".".join(str(part) for part in first["loc"] if not _is_type_tag(part))
+    if first["type"] == "extra_forbidden":
+        known = _known_keys(first["loc"][:-1])
+        return f"unknown key {where!r}{suggestion(str(first['loc'][-1]), known)}"
+    if first["type"] == "missing":
+        kind = "table" if first["loc"] == ("oracle",) else "key"
+        return f"the {kind} {where!r} is missing"
+    allowed = first["msg"].removeprefix("Input ").replace("valid ", "").replace("a integer", "a whole number")
+    if _is_type_tag(first["loc"][-1]):
+        allowed = "should be a finite number, a text, true or false"
+    if "pattern" in (first.get("ctx") or {}):
+        allowed = "should be letters, digits and underscores, starting with a letter"
+    return f"{where} {allowed}, got {first['input']!r}"
+
+
+def _is_type_tag(part: Any) -> bool:
+    """Whether pydantic put the name of a type, not a key, in an error's location."""
+    return part in {"bool", "int", "float", "str", "constrained-float"}
+
+
+def _known_keys(location: Sequence[Any]) -> list[str]:
+    """Keys of the table at `location`."""
+    model: Any = Config
+    for part in location:
+        hint = model.model_fields[part].annotation if part in getattr(model, "model_fields", {}) else None
+        if isinstance(hint, type) and issubclass(hint, BaseModel):
+            model = hint
+        elif part == "factors":
+            model = Config.model_fields["factors"]
+        elif not isinstance(model, type):
+            model = FactorRange
+    return list(getattr(model, "model_fields", {}))
+
+
+def differences(ours: Config, theirs: Config) -> list[str]:
+    """Dotted keys in which two configs differ."""
+    return sorted(_differ(ours.model_dump(), theirs.model_dump(), ""))
+
+
+def _differ(a: Mapping[str, Any], b: Mapping[str, Any], prefix: str) -> set[str]:
+    found: set[str] = set()
+    for key in {*a, *b}:
+        here, there = a.get(key), b.get(key)
+        if isinstance(here, Mapping) and isinstance(there, Mapping):
+            found |= _differ(here, there, f"{prefix}{key}.")
+        elif here != there:
+            found.add(f"{prefix}{key}")
+    return found

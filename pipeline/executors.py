@@ -1,0 +1,51 @@
+"""How a design is run: what is known is read back, the rest is answered batch by batch and stored at once."""
+
+from typing import Protocol
+
+import numpy as np
+
+from experiments.designs import Design
+from experiments.oracles import Answers, Oracle
+from experiments.runs import Runs
+
+from .store import PointStore
+
+
+class Progress(Protocol):
+    """What a run tells while it goes: a stage, how many are done, and of how many."""
+
+    def __call__(self, stage: str, done: int, total: int) -> None: ...
+
+
+def silent(stage: str, done: int, total: int) -> None:
+    """Tell nothing."""
+
+
+def execute(oracle: Oracle, design: Design, store: PointStore, stage: str, progress: Progress = silent) -> Runs:
+    """Run `design` in this process.
+
+    A point that was answered before, in this folder by the same oracle, is not run again.
+    """
+    points = design.physical
+    keys = store.keys(points)
+    answers = store.known(keys)
+    missing = np.array([i for i, key in enumerate(keys) if key not in answers], dtype=int)
+    progress(stage, len(points) - len(missing), len(points))
+    for start in range(0, len(missing), oracle.batch):
+        rows = missing[start : start + oracle.batch]
+        runs = oracle(design.take(rows))
+        batch = Answers(runs.values, list(runs.status), list(runs.reasons))
+        batch_keys = [keys[i] for i in rows]
+        store.add(batch_keys, points[rows], batch)
+        answers.update(
+            zip(batch_keys, zip(batch.values.tolist(), batch.status, batch.reasons, strict=True), strict=True)
+        )
+        progress(stage, len(points) - len(missing) + start + len(rows), len(points))
+    ordered = [answers[key] for key in keys]
+    return Runs(
+        design,
+        oracle.responses,
+        np.array([values for values, _, _ in ordered], dtype=np.float64).reshape(len(design), len(oracle.responses)),
+        tuple(status for _, status, _ in ordered),
+        tuple(reason for _, _, reason in ordered),
+    )

@@ -1,0 +1,5 @@
+"""The report: one self-contained HTML file, made from the nouns of a finished study."""
+
+from .build import report_html
+
+__all__ = ["report_html"]

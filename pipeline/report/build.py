@@ -1,0 +1,70 @@
+"""Puts the report together: views and figures into the template."""
+
+import json
+from importlib.resources import files
+from typing import Any
+
+from jinja2 import Environment, StrictUndefined
+
+from ..runner import Outcome
+from . import figures, views
+
+_HERE = files(__package__)
+
+
+def report_html(outcome: Outcome, provenance: str) -> str:
+    """The report as one HTML text that needs no other file.
+
+    Parameters
+    ----------
+    outcome : Outcome
+    provenance : str
+        Text of ``provenance.json``.
+    """
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    template = environment.from_string(_read("template.html"))
+    return template.render(_content(outcome, json.loads(provenance)))
+
+
+def _content(outcome: Outcome, provenance: dict[str, Any]) -> dict[str, Any]:
+    model, config = outcome.model, outcome.study.config
+    cases = views.shapes(outcome)
+    n = range(len(model.responses))
+    return {
+        "style": _read("style.css"),
+        "script": _read("viewer.js"),
+        "config": config,
+        "title": config.title or config.name,
+        "oracle": outcome.study.oracle,
+        "responses": model.responses,
+        "factors": views.factors(outcome),
+        "model": model,
+        "headline": views.headline(outcome),
+        "shortfalls": outcome.shortfalls,
+        "requirements": config.require.model_dump(exclude_none=True),
+        "activity": views.activity(outcome),
+        "flagged": outcome.screening.flagged_dummies,
+        "screening_runs": len(outcome.screening_runs),
+        "screening_figures": [figures.screening_figure(outcome, j) for j in n],
+        "fill": views.fill(outcome),
+        "design_figure": figures.design_figure(outcome),
+        "terms": [", ".join(model.terms_of(j)) or "none" for j in n],
+        "map": views.linear_map(outcome),
+        "coefficients": views.coefficients(outcome),
+        "published": views.published(outcome),
+        "validation": views.error_rows(outcome, model.validation),
+        "validation_failures": outcome.validation_runs.failures(),
+        "validation_figures": [figures.validation_figure(outcome, j) for j in n],
+        "certificate": views.certificate(outcome),
+        "trip": outcome.round_trip,
+        "trip_rows": views.error_rows(outcome, outcome.round_trip.errors),
+        "shapes": [label for label, _ in cases],
+        "shape_figure": figures.shape_figure(cases[0][1]) if cases else "",
+        "viewer_data": views.viewer_data(cases),
+        "provenance": provenance,
+        "prefix": outcome.study.export_prefix,
+    }
+
+
+def _read(name: str) -> str:
+    return (_HERE / name).read_text(encoding="utf-8")

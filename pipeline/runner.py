@@ -1,0 +1,226 @@
+"""The runner: takes a study through its stages and writes each noun down as soon as it is known."""
+
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+
+from experiments.designs import Design
+from experiments.runs import Runs
+from experiments.screening import Screening, screen
+from surrogates import Surrogate, dumps, exports, loads
+
+from . import stages, tables
+from .config import load_config
+from .errors import InputError, RequirementNotMet
+from .executors import Progress, execute, silent
+from .provenance import provenance_json
+from .stages import RoundTrip
+from .store import RunFolder
+from .study import STAGES, Study, resolve
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """A finished study: every noun, and where they lie.
+
+    Parameters
+    ----------
+    path : Path
+        The run folder.
+    study : Study
+    screening_runs, fit_runs, validation_runs : Runs
+    screening : Screening
+    kept : tuple of str
+        Factors that the model was fitted on.
+    model : Surrogate
+    round_trip : RoundTrip
+    shortfalls : tuple of str
+        Declared requirements that do not hold.
+    seconds : dict
+        Wall time by stage; empty for a folder that was read back.
+    """
+
+    path: Path
+    study: Study
+    screening_runs: Runs
+    screening: Screening
+    kept: tuple[str, ...]
+    fit_runs: Runs
+    model: Surrogate
+    validation_runs: Runs
+    round_trip: RoundTrip
+    shortfalls: tuple[str, ...]
+    seconds: dict[str, float] = field(default_factory=dict)
+
+
+def run(
+    config: str | Path,
+    out: str | Path | None = None,
+    overrides: Sequence[str] = (),
+    fresh: bool = False,
+    progress: Progress = silent,
+    strict: bool = False,
+) -> Outcome:
+    """Run or continue the study in a config file.
+
+    Parameters
+    ----------
+    config : path
+    out : path, optional
+        Run folder; ``runs/<name>`` if not given.
+    overrides : sequence of str
+        ``dotted.key=value`` settings that replace the file's.
+    fresh : bool
+        Start anew in a folder that belongs to a study already.
+    progress : callable
+        Told the stage, the runs done and the runs in all.
+    strict : bool
+        Whether an unmet requirement raises; if not, it is in the outcome's ``shortfalls``.
+
+    Raises
+    ------
+    InputError
+        If the config or the folder is wrong; nothing is touched then.
+    TooManyFailures
+        If more runs failed than the config tolerates.
+    RequirementNotMet
+        If `strict` and a declared requirement does not hold; everything is written first.
+    """
+    study = resolve(load_config(config, overrides))
+    folder = RunFolder.claim(Path(out) if out is not None else Path("runs") / study.config.name, study.config, fresh)
+    outcome = _Runner(study, folder, progress).run()
+    if strict and outcome.shortfalls:
+        raise RequirementNotMet("; ".join(outcome.shortfalls))
+    return outcome
+
+
+class _Runner:
+    """One pass through the stages."""
+
+    def __init__(self, study: Study, folder: RunFolder, progress: Progress) -> None:
+        self.study, self.folder, self.progress = study, folder, progress
+        self.points = folder.points(study.oracle)
+        self.seconds: dict[str, float] = {}
+
+    def run(self) -> Outcome:
+        study, folder, started = self.study, self.folder, datetime.now(UTC)
+        with self._timed("screening"):
+            screening_runs = self._executed("screening", study.screening_design)
+            screening = stages.screened(study, screening_runs)
+            folder.write("screening/effects.csv", tables.effects_csv(screening))
+            kept = stages.kept_factors(study, screening)
+        with self._timed("fill design"):
+            fill = stages.fill_design(study, kept)
+        with self._timed("fit"):
+            fit_runs = self._executed("fit", fill)
+            model, _ = stages.fitted(study, kept, fit_runs)
+        with self._timed("validation"):
+            validation_runs = self._executed("validation", stages.validation_design(study))
+            model = stages.validated(study, model, validation_runs)
+            folder.write("validation/errors.csv", tables.errors_csv(model.validation, model.responses))
+        with self._timed("inversion"):
+            trip = self._round_trip(model, validation_runs)
+        with self._timed("export"):
+            folder.write("model.json", dumps(model))
+            self._export()
+        shortfalls = tuple(stages.shortfalls(study, model))
+        outcome = Outcome(
+            folder.path, study, screening_runs, screening, kept, fit_runs, model, validation_runs, trip, shortfalls,
+            self.seconds,
+        )  # fmt: skip
+        folder.write("provenance.json", provenance_json(started, datetime.now(UTC), self.seconds))
+        with self._timed("report"):
+            write_report(folder, outcome)
+        folder.write("provenance.json", provenance_json(started, datetime.now(UTC), self.seconds))
+        return outcome
+
+    def _executed(self, stage: str, design: Design) -> Runs:
+        self.folder.write(f"{stage}/design.csv", tables.design_csv(design))
+        runs = execute(self.study.oracle, design, self.points, stage, self.progress)
+        self.folder.write(f"{stage}/runs.csv", tables.runs_csv(runs))
+        return runs
+
+    def _round_trip(self, model: Surrogate, validation_runs: Runs) -> RoundTrip:
+        targets, inversion, design = stages.inversion_design(model, validation_runs)
+        table = tables.inversion_csv(targets.values, inversion, model.factors, model.responses)
+        self.folder.write("inversion/targets.csv", table)
+        trip = stages.round_trip(self.study, targets, inversion, self._executed("inversion", design))
+        if trip.errors:
+            self.folder.write("inversion/errors.csv", tables.errors_csv(trip.errors, model.responses))
+        return trip
+
+    def _export(self) -> None:
+        """Generate every target from ``model.json`` as it lies in the folder, and from nothing else."""
+        model = loads(self.folder.read("model.json"))
+        for name in self.study.config.export.targets:
+            for file, text in exports.get(name).render(model, self.study.export_prefix).items():
+                self.folder.write(f"exports/{name}/{file}", text)
+
+    @contextmanager
+    def _timed(self, stage: str) -> Iterator[None]:
+        if stage not in STAGES:
+            self.progress(stage, 0, 0)
+        begin = time.perf_counter()
+        yield
+        self.seconds[stage] = time.perf_counter() - begin
+        if stage not in STAGES:
+            self.progress(stage, 1, 1)
+
+
+def read_run(path: str | Path) -> Outcome:
+    """A finished run folder, read back for a report or a notebook; runs nothing.
+
+    Raises
+    ------
+    InputError
+        If the folder is no run folder, or a file of it is missing or damaged.
+    """
+    folder, config = RunFolder.existing(Path(path))
+    study = resolve(config)
+    try:
+        model = loads(folder.read("model.json"))
+    except ValueError as error:
+        raise InputError(f"{folder.path / 'model.json'}: {error}") from None
+    runs = {stage: _read_stage(folder, study, stage) for stage in STAGES}
+    screening = screen(runs["screening"], config.screening.alpha, study.oracle.resolution)
+    targets = runs["validation"].completed()
+    inversion = model.invert(targets.values)
+    answers = runs["inversion"]
+    return Outcome(
+        folder.path,
+        study,
+        runs["screening"],
+        screening,
+        stages.kept_factors(study, screening),
+        runs["fit"],
+        model,
+        runs["validation"],
+        stages.round_trip(study, targets, inversion, answers),
+        tuple(stages.shortfalls(study, model)),
+    )
+
+
+def write_report(folder: RunFolder, outcome: Outcome) -> Path:
+    """Write ``report.html`` of a finished study."""
+    from .report import report_html  # matplotlib and jinja2 are not needed before this
+
+    return folder.write("report.html", report_html(outcome, folder.read("provenance.json")))
+
+
+def _read_stage(folder: RunFolder, study: Study, stage: str) -> Runs:
+    method = {
+        "screening": study.config.screening.design.method,
+        "fit": study.config.fit.design.method,
+        "validation": "random",
+        "inversion": "inverse",
+    }[stage]
+    return tables.read_runs(
+        folder.read(f"{stage}/design.csv"),
+        folder.read(f"{stage}/runs.csv"),
+        study.space,
+        study.oracle.responses,
+        method,
+    )
