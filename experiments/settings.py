@@ -77,7 +77,7 @@ def _check_type(kind: str, key: str, value: Any, hint: Any) -> None:
         words = {float: "a number", int: "a whole number", str: "a text", bool: "true or false"}
         wanted = " or ".join(words.get(o, o.__name__) for o in options if o is not type(None))
         raise ValueError(f"{kind}: {key} must be {wanted}, got {value!r}")
-    if is_number and not math.isfinite(value):
+    if isinstance(value, float) and not math.isfinite(value):
         raise ValueError(f"{kind}: {key} must be finite, got {value!r}")
 
 

@@ -27,14 +27,14 @@ class FactorRange(Table):
 
     low: Number = Field(description="low end, in the factor's unit")
     high: Number = Field(description="high end, in the factor's unit")
-    unit: str | None = Field(None, description="the factor's unit, checked if given")
+    unit: str | None = Field(default=None, description="the factor's unit, checked if given")
 
 
 class DesignTable(Table):
     """A design method and its settings; ``flexdoce list`` names them."""
 
     model_config = ConfigDict(extra="allow", frozen=True, strict=True)
-    __pydantic_extra__: dict[str, Setting]
+    __pydantic_extra__: dict[str, Setting] = Field(init=False)  # type: ignore[assignment]
 
     method: str = Field(description="name of the design method")
 
@@ -48,66 +48,68 @@ class OracleTable(Table):
     """What answers the runs."""
 
     name: str = Field(description="name of the oracle")
-    parameters: dict[str, Setting] = Field({}, description="oracle inputs held fixed; defaults where not given")
+    parameters: dict[str, Setting] = Field(default={}, description="oracle inputs held fixed; defaults where not given")
     max_failed_fraction: float = Field(
-        0.0, ge=0.0, le=1.0, description="failed runs tolerated in the fit and the validation"
+        default=0.0, ge=0.0, le=1.0, description="failed runs tolerated in the fit and the validation"
     )
 
 
 class ScreeningTable(Table):
     """Which factors act."""
 
-    design: DesignTable = Field(DesignTable(method="plackett_burman"), description="orthogonal two-level design")
-    alpha: float = Field(0.05, gt=0.0, lt=1.0, description="error rate of Lenth's margins")
-    keep: list[str] = Field([], description="factors kept whatever the screening says")
+    design: DesignTable = Field(
+        default=DesignTable(method="plackett_burman"), description="orthogonal two-level design"
+    )
+    alpha: float = Field(default=0.05, gt=0.0, lt=1.0, description="error rate of Lenth's margins")
+    keep: list[str] = Field(default=[], description="factors kept whatever the screening says")
 
 
 class FitTable(Table):
     """The polynomial and the design that it is fitted on."""
 
     design: DesignTable = Field(
-        DesignTable(method="uniform"),
+        default=DesignTable(method="uniform"),
         description="filling design; without n_runs it is sized from the factors that act",
     )
-    degree: int = Field(2, ge=1, le=5, description="highest total degree of the candidate terms")
-    interactions: bool = Field(True, description="whether products of different factors are candidates")
-    trim: bool = Field(True, description="whether terms that the data do not support are removed")
+    degree: int = Field(default=2, ge=1, le=5, description="highest total degree of the candidate terms")
+    interactions: bool = Field(default=True, description="whether products of different factors are candidates")
+    trim: bool = Field(default=True, description="whether terms that the data do not support are removed")
     runs_per_term: float = Field(
-        1.05, ge=1.0, le=100.0, description="runs per candidate term, where n_runs is not given"
+        default=1.05, ge=1.0, le=100.0, description="runs per candidate term, where n_runs is not given"
     )
 
 
 class ValidationTable(Table):
     """Fresh random runs."""
 
-    n_runs: int = Field(1000, ge=2, le=10_000_000, description="uniform random runs in the whole box")
+    n_runs: int = Field(default=1000, ge=2, le=10_000_000, description="uniform random runs in the whole box")
 
 
 class RequireTable(Table):
     """What must hold; the command ends with exit code 4 if it does not."""
 
     max_relative_error: float | None = Field(
-        None, gt=0.0, description="largest error on fresh runs over the response's range, every response"
+        default=None, gt=0.0, description="largest error on fresh runs over the response's range, every response"
     )
-    certified_inverse: bool = Field(False, description="whether the inverse must be certified")
+    certified_inverse: bool = Field(default=False, description="whether the inverse must be certified")
 
 
 class ExportTable(Table):
     """Code generated from the model."""
 
-    targets: list[str] = Field(["c99"], description="export targets; flexdoce list names them")
-    prefix: str | None = Field(None, description="prefix of generated names; the study's name if not given")
+    targets: list[str] = Field(default=["c99"], description="export targets; flexdoce list names them")
+    prefix: str | None = Field(default=None, description="prefix of generated names; the study's name if not given")
 
 
 class Config(Table):
     """A study, as written by a person."""
 
-    version: Literal[1] = Field(1, description="version of this format")
+    version: Literal[1] = Field(default=1, description="version of this format")
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", description="short name: letters, digits, underscores")
-    title: str = Field("", description="one line for the report")
-    seed: int = Field(0, ge=0, le=2**63 - 1, description="seed of everything random")
+    title: str = Field(default="", description="one line for the report")
+    seed: int = Field(default=0, ge=0, le=2**63 - 1, description="seed of everything random")
     oracle: OracleTable
-    factors: dict[str, FactorRange] = Field({}, description="ranges that replace the oracle's defaults")
+    factors: dict[str, FactorRange] = Field(default={}, description="ranges that replace the oracle's defaults")
     screening: ScreeningTable = ScreeningTable()
     fit: FitTable = FitTable()
     validation: ValidationTable = ValidationTable()

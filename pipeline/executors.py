@@ -14,7 +14,9 @@ from .store import PointStore
 class Progress(Protocol):
     """What a run tells while it goes: a stage, how many are done, and of how many."""
 
-    def __call__(self, stage: str, done: int, total: int) -> None: ...
+    def __call__(self, stage: str, done: int, total: int) -> None:
+        """Called after every batch, from the thread that runs the study."""
+        ...
 
 
 def silent(stage: str, done: int, total: int) -> None:

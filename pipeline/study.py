@@ -67,8 +67,7 @@ def resolve(config: Config) -> Study:
         With one sentence that says which table is wrong, what came and what is allowed.
     """
     oracle = _checked("oracle", lambda: oracles.get(config.oracle.name, **config.oracle.parameters))
-    if hasattr(oracle, "prepare"):
-        _checked("oracle.parameters", oracle.prepare)
+    _checked("oracle.parameters", oracle.prepare)
     space = _checked("factors", lambda: _space(config, oracle))
     screening = config.screening
     method = _checked("screening.design", lambda: designs.get(screening.design.method, screening.design.settings))

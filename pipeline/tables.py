@@ -12,7 +12,7 @@ from experiments.factors import FactorSpace
 from experiments.naming import column_label, parse_column_label
 from experiments.runs import Response, Runs, Status
 from experiments.screening import Screening
-from surrogates import Inversion, ResponseError
+from surrogates import Inversion, ResponseError, Surrogate
 
 from .errors import InputError
 
@@ -101,6 +101,14 @@ def inversion_csv(
     nearest = pd.DataFrame(inversion.nearest, columns=pd.Index([f"nearest_{r.label}" for r in responses]))
     status = pd.Series([str(s) for s in inversion.status], name="status")
     return _csv(pd.concat([table, settings, status, nearest], axis=1))
+
+
+def prediction_csv(model: Surrogate, points: NDArray[np.float64], inside: NDArray[np.bool_]) -> str:
+    """Settings, predicted responses, and whether each setting lies in the model's domain."""
+    columns = [*model.factors.labels, *(r.label for r in model.responses)]
+    table = pd.DataFrame(np.hstack([points, model.predict(points)]), columns=pd.Index(columns))
+    table["status"] = np.where(inside, "ok", "outside")
+    return _csv(table)
 
 
 def read_points(text: str, wanted: Sequence[Response] | FactorSpace, origin: str) -> NDArray[np.float64]:

@@ -153,7 +153,7 @@ def _affine_part(model: "Surrogate") -> tuple[NDArray[np.float64], NDArray[np.fl
 def _reached(model: "Surrogate", coded: NDArray[np.float64], targets: NDArray[np.float64]) -> NDArray[np.bool_]:
     inside = (np.abs(coded) <= 1.0 + BOX_TOLERANCE).all(axis=1)
     miss = np.abs(model.predict_coded(coded) - targets) / model.scale
-    return inside & (miss <= TARGET_TOLERANCE).all(axis=1)
+    return np.logical_and(inside, (miss <= TARGET_TOLERANCE).all(axis=1))
 
 
 def _gauss_newton(model: "Surrogate", targets: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -78,7 +78,10 @@ class PolynomialRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         ValueError
             If a setting is out of range, or `X`, `y`, `space` and `responses` do not fit together.
         """
-        X, y = validate_data(self, X, y, multi_output=True, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
+        checked: Any = validate_data(
+            self, X, y, multi_output=True, y_numeric=True, dtype=np.float64, ensure_min_samples=2
+        )
+        X, y = np.asarray(checked[0]), checked[1]
         self._check_settings()
         space = self.space if self.space is not None else _space_of(X, getattr(self, "feature_names_in_", None))
         table = np.asarray(y, dtype=np.float64).reshape(len(X), -1)

@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike, NDArray
 
 def unit_levels(levels: int) -> NDArray[np.float64]:
     """Where `levels` levels sit in [0, 1]: (2k − 1)/(2q) for k = 1 … q, shape (levels,)."""
-    return (2.0 * np.arange(1, levels + 1) - 1.0) / (2.0 * levels)
+    return (np.arange(1, levels + 1, dtype=np.float64) - 0.5) / levels
 
 
 def centred_discrepancy_squared(points: ArrayLike) -> float:

@@ -118,6 +118,15 @@ class Oracle(ABC):
     def evaluate(self, points: NDArray[np.float64]) -> Answers:
         """Answer points in physical units, shape (n, n_factors)."""
 
+    def prepare(self) -> None:  # noqa: B027 - most oracles have nothing to prepare
+        """Build once, before the first run and outside of tracing, what every point needs: a mesh, a factorisation.
+
+        Raises
+        ------
+        ValueError
+            If the parameters describe something that cannot be built.
+        """
+
     @property
     def parameters(self) -> dict[str, Any]:
         """Inputs held fixed, as plain JSON-able values."""
@@ -181,15 +190,6 @@ class JaxOracle(Oracle):
     @abstractmethod
     def respond(self, point: Any) -> Any:
         """Responses (n_responses,) at `point`, shape (n_factors,); traceable by JAX."""
-
-    def prepare(self) -> None:
-        """Build once, outside of tracing, what every point needs: a mesh, a factorisation.
-
-        Raises
-        ------
-        ValueError
-            If the parameters describe something that cannot be built.
-        """
 
     def evaluate(self, points: NDArray[np.float64]) -> Answers:
         """Answer in padded batches of :data:`CHUNK`."""

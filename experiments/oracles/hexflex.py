@@ -15,7 +15,7 @@ from ..runs import Response
 from ..settings import parameter
 from .base import Arrow, JaxOracle, Line, PublishedMap, Shape
 
-_DATA = json.loads((files(__package__) / "data" / "hexflex.json").read_text(encoding="utf-8"))
+_DATA = json.loads((files("experiments.oracles") / "data" / "hexflex.json").read_text(encoding="utf-8"))
 _GEOMETRY = _DATA["geometry"]
 
 TABS = ("T1", "T2", "T3")

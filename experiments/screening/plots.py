@@ -28,16 +28,17 @@ def half_normal(ax: "Axes", result: LenthResult, response: Response) -> "Axes":
     ax.plot(quantile[~active], size[~active], "o", color=QUIET, ms=4)
     ax.plot(quantile[active], size[active], "o", color=ACTIVE, ms=5)
     top = size.max(initial=0.0)
-    placed = -np.inf
-    for i in np.flatnonzero(active):
-        # Equal effects are common in symmetric mechanisms: keep their labels apart.
-        placed = max(size[i], placed + 0.075 * top)
-        ax.annotate(result.names[order[i]], (quantile[i], size[i]), (quantile[i] - 0.12, placed), ha="right",
-                    va="center", fontsize=7, color=ACTIVE)  # fmt: skip
+    crowded = 0
+    for before, i in zip([-1, *np.flatnonzero(active)], np.flatnonzero(active), strict=False):
+        # Symmetric mechanisms have equal effects side by side: stack the labels that would collide.
+        close = before >= 0 and quantile[i] - quantile[before] < 0.2 and size[i] - size[before] < 0.06 * top
+        crowded = crowded + 1 if close else 0
+        ax.annotate(result.names[order[i]], (quantile[i], size[i]), (0, 5 + 8 * crowded), textcoords="offset points",
+                    ha="center", fontsize=7, color=ACTIVE)  # fmt: skip
     _margin_lines(ax.axhline, result, response, top)
     ax.set(xlabel="half-normal quantile", ylabel=f"|effect| [{response.shown_unit}]", title="Half-normal")
-    ax.set_xlim(0.0, quantile[-1] * 1.1)
-    ax.set_ylim(0.0, max(top, placed) * 1.12 or 1.0)
+    ax.set_xlim(0.0, quantile[-1] * 1.12)
+    ax.set_ylim(0.0, 1.18 * top or 1.0)
     return ax
 
 

@@ -33,7 +33,7 @@ class Screening:
     @property
     def active_factors(self) -> tuple[str, ...]:
         """Factors that act on at least one response."""
-        acts = self.active[: self.effects.n_factors].any(axis=1)
+        acts = np.atleast_1d(self.active[: self.effects.n_factors].any(axis=1))
         return tuple(n for n, a in zip(self.effects.names, acts, strict=False) if a)
 
     def active_on(self, response: str) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from jinja2 import Environment, StrictUndefined
 from ..runner import Outcome
 from . import figures, views
 
-_HERE = files(__package__)
+_HERE = files("pipeline.report")
 
 
 def report_html(outcome: Outcome, provenance: str) -> str:

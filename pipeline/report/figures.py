@@ -3,6 +3,7 @@
 import base64
 import io
 from collections.abc import Callable
+from typing import Any
 
 import matplotlib
 
@@ -14,7 +15,7 @@ from surrogates.plots import parity, residuals
 
 from ..runner import Outcome
 
-STYLE = {
+STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "flexdoce",
     "font.family": "sans-serif",

@@ -47,7 +47,7 @@
     const now = cases[chosen], factor = now.factor * gain;
     const flat = now.lines.flatMap((l) => l.rest);
     const middle = [0, 1, 2].map((i) => (Math.min(...flat.map((p) => p[i])) + Math.max(...flat.map((p) => p[i]))) / 2);
-    const zoom = (0.82 * H) / now.size;
+    const zoom = (0.7 * H) / now.size;
     const place = (p) => {
       const q = project(p.map((v, i) => v - middle[i]));
       return [W / 2 + zoom * q[0], H / 2 + zoom * q[1]];

@@ -1,0 +1,6 @@
+"""``python -m pipeline`` is ``flexdoce``."""
+
+from .cli import main
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,82 @@
+"""The command line: parses arguments, calls the pipeline, prints. Every error is one sentence and an exit code."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from . import commands
+from .errors import FlexdoceError
+
+EPILOG = (
+    "exit codes: 0 done; 2 bad config or arguments; 3 too many failed runs; "
+    "4 a declared requirement is not met; 1 a bug of ours"
+)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code."""
+    arguments = _parser().parse_args(argv)
+    try:
+        return arguments.command(arguments) or 0
+    except FlexdoceError as error:
+        print(f"flexdoce: {error}", file=sys.stderr)
+        return error.exit_code
+    except BrokenPipeError:
+        return 0
+    except OSError as error:
+        # A full disk, a lost mount: not the config's fault and not a bug of ours.
+        print(f"flexdoce: {error.filename or 'the disk'}: {error.strerror}; run the same command to continue",
+              file=sys.stderr)  # fmt: skip
+        return 1
+    except KeyboardInterrupt:
+        print("flexdoce: stopped; what was answered is stored, run the same command to continue", file=sys.stderr)
+        return 130
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="flexdoce",
+        description="From a simulator of a compliant mechanism to a small, invertible, trusted formula.",
+        epilog=EPILOG,
+    )
+    verbs = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    def verb(name: str, function: object, summary: str) -> argparse.ArgumentParser:
+        sub = verbs.add_parser(name, help=summary, description=summary)
+        sub.set_defaults(command=function)
+        return sub
+
+    for name, function, summary in (
+        ("run", commands.run, "run a study, or continue it"),
+        ("check", commands.check, "validate a config and print it as resolved; touches nothing"),
+        ("plan", commands.plan, "print the designs of a study; runs nothing"),
+    ):
+        sub = verb(name, function, summary)
+        sub.add_argument("config", metavar="CONFIG", help="config file, TOML")
+        sub.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
+                         help="replace a setting, such as fit.degree=3; repeatable")  # fmt: skip
+        if name == "run":
+            sub.add_argument("--out", metavar="DIR", help="run folder (default: runs/<name of the study>)")
+            sub.add_argument("--fresh", action="store_true", help="start anew in a folder that was used before")
+
+    sub = verb("report", commands.report, "write report.html of a run folder again; runs nothing")
+    sub.add_argument("folder", metavar="RUN_DIR")
+
+    for name, function, table, summary in (
+        ("predict", commands.predict, "IN.csv", "responses at settings from a CSV"),
+        ("invert", commands.invert, "TARGETS.csv", "settings for responses from a CSV"),
+    ):
+        sub = verb(name, function, summary)
+        sub.add_argument("model", metavar="MODEL.json")
+        sub.add_argument("table", metavar=table, help="CSV with one named column each; '-' reads standard input")
+        sub.add_argument("--out", metavar="FILE", help="write the answers there instead of printing them")
+
+    sub = verb("export", commands.export, "generate code from a model")
+    sub.add_argument("model", metavar="MODEL.json")
+    sub.add_argument("--to", required=True, metavar="NAME", help="export target; 'flexdoce list' names them")
+    sub.add_argument("--out", required=True, metavar="DIR", help="folder to write to")
+    sub.add_argument("--prefix", metavar="NAME", help="prefix of generated names (default: name of the study)")
+    sub.add_argument("--force", action="store_true", help="overwrite files that are there already")
+
+    verb("list", commands.list_known, "list oracles, designs and export targets with their settings")
+    return parser

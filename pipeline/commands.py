@@ -1,0 +1,152 @@
+"""What each command does. Each takes the parsed arguments and returns an exit code, or None for 0."""
+
+import sys
+from argparse import Namespace
+from pathlib import Path
+
+import numpy as np
+
+from experiments import designs, oracles, settings
+from surrogates import Surrogate, exports, load
+
+from . import tables
+from .config import dump_config, load_config
+from .console import console, design_table, progress_bars, summary
+from .errors import InputError, RequirementNotMet
+from .store import RunFolder
+from .study import resolve
+
+
+def run(arguments: Namespace) -> int | None:
+    """``flexdoce run``."""
+    from .runner import run as run_study
+
+    with progress_bars() as progress:
+        outcome = run_study(arguments.config, arguments.out, arguments.overrides, arguments.fresh, progress)
+    summary(outcome)
+    if outcome.shortfalls:
+        raise RequirementNotMet("required but not met: " + "; ".join(outcome.shortfalls))
+    return None
+
+
+def check(arguments: Namespace) -> None:
+    """``flexdoce check``."""
+    study = resolve(load_config(arguments.config, arguments.overrides))
+    print(dump_config(study.config), end="")
+
+
+def plan(arguments: Namespace) -> None:
+    """``flexdoce plan``."""
+    from . import stages
+
+    study = resolve(load_config(arguments.config, arguments.overrides))
+    screening, n = study.screening_design, len(study.space)
+    design_table(screening, f"Screening: {len(screening)} runs, {screening.method}")
+    fill = stages.fill_design(study, study.space.names)
+    terms = study.candidates(n)
+    design_table(fill, f"Fit, if all {n} factors act: {len(fill)} runs, {fill.method}, {len(terms)} candidate terms")
+    n_validation = study.config.validation.n_runs
+    console.print(f"Validation: {n_validation} random runs; inversion: up to {n_validation} more.")
+    console.print(f"At most {len(screening) + len(fill) + 2 * n_validation} runs in all. Nothing was run.")
+
+
+def report(arguments: Namespace) -> None:
+    """``flexdoce report``."""
+    from .runner import read_run, write_report
+
+    folder, _ = RunFolder.existing(Path(arguments.folder))
+    print(write_report(folder, read_run(arguments.folder)))
+
+
+def predict(arguments: Namespace) -> None:
+    """``flexdoce predict``."""
+    model = _model(arguments.model)
+    points = tables.read_points(_text(arguments.table), model.factors, _origin(arguments.table))
+    inside = model.contains(points)
+    _emit(tables.prediction_csv(model, points, inside), arguments.out)
+    if not inside.all():
+        _warn(f"{np.sum(~inside)} of {len(points)} rows lie outside the model's domain; their status is 'outside'")
+
+
+def invert(arguments: Namespace) -> None:
+    """``flexdoce invert``."""
+    model = _model(arguments.model)
+    targets = tables.read_points(_text(arguments.table), model.responses, _origin(arguments.table))
+    inversion = model.invert(targets)
+    _emit(tables.inversion_csv(targets, inversion, model.factors, model.responses), arguments.out)
+    if not inversion.ok.all():
+        _warn(
+            f"{np.sum(~inversion.ok)} of {len(targets)} targets are out of reach and were refused; "
+            "the columns nearest_* hold the nearest responses that can be reached"
+        )
+
+
+def export(arguments: Namespace) -> None:
+    """``flexdoce export``."""
+    model = _model(arguments.model)
+    prefix = arguments.prefix or str(model.provenance.get("study", "model"))
+    try:
+        texts = exports.get(arguments.to).render(model, prefix)
+    except ValueError as error:
+        raise InputError(str(error)) from None
+    out = Path(arguments.out)
+    there = [name for name in texts if (out / name).exists()]
+    if there and not arguments.force:
+        raise InputError(f"{out} already holds {', '.join(there)}; use --force to overwrite, or another --out")
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        for name, text in texts.items():
+            (out / name).write_text(text, encoding="utf-8", newline="\n")
+            print(out / name)
+    except OSError as error:
+        raise InputError(f"cannot write to {out}: {error.strerror}") from None
+
+
+def list_known(arguments: Namespace) -> None:
+    """``flexdoce list``."""
+    for title, known in (
+        ("oracles", {name: oracles.oracle_class(name) for name in oracles.names()}),
+        ("designs", designs.METHODS),
+        ("exports", exports.TARGETS),
+    ):
+        console.print(f"[bold]{title}[/bold]")
+        for name, cls in known.items():
+            console.print(f"  [cyan]{name}[/cyan]  {cls.summary}", soft_wrap=True)
+            for row in settings.describe(cls):
+                unit = f" {row['unit']}" if row["unit"] not in ("", "1") else ""
+                line = f"      {row['name']} = {row['default']}{unit}  {row['about']}"
+                console.print(line, style="dim", markup=False, soft_wrap=True)
+    console.print("Factors and responses of an oracle: flexdoce plan with a config that names it.", style="dim")
+
+
+def _model(path: str) -> Surrogate:
+    try:
+        return load(path)
+    except ValueError as error:
+        raise InputError(str(error)) from None
+
+
+def _text(path: str) -> str:
+    try:
+        return sys.stdin.read() if path == "-" else Path(path).read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
+        raise InputError(f"cannot read the table {path}: {reason}") from None
+
+
+def _origin(path: str) -> str:
+    return "standard input" if path == "-" else path
+
+
+def _emit(text: str, out: str | None) -> None:
+    if out is None:
+        print(text, end="")
+        return
+    try:
+        Path(out).write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise InputError(f"cannot write {out}: {error.strerror}") from None
+
+
+def _warn(sentence: str) -> None:
+    print(f"flexdoce: {sentence}", file=sys.stderr)

@@ -1,0 +1,94 @@
+"""What a person sees in a terminal: progress bars, tables, the summary at the end."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from experiments.designs import Design
+
+from .executors import Progress as Told
+from .runner import Outcome
+
+console = Console(highlight=False)
+_errors = Console(stderr=True, highlight=False)
+
+
+@contextmanager
+def progress_bars() -> Iterator[Told]:
+    """One bar per stage on standard error; plain lines where that is no terminal."""
+    if not _errors.is_terminal:
+        yield _lines
+        return
+    columns = (SpinnerColumn(finished_text="✓"), TextColumn("{task.description:<12}"), BarColumn(bar_width=32),
+               MofNCompleteColumn(), TimeElapsedColumn())  # fmt: skip
+    tasks: dict[str, TaskID] = {}
+    with Progress(*columns, console=_errors) as bars:
+
+        def told(stage: str, done: int, total: int) -> None:
+            if stage not in tasks:
+                tasks[stage] = bars.add_task(stage, total=total or None)
+            bars.update(tasks[stage], completed=done, total=total or None)
+
+        yield told
+
+
+def _lines(stage: str, done: int, total: int) -> None:
+    if total and done == total:
+        _errors.print(f"{stage}: {total} runs done" if total > 1 else f"{stage}: done")
+
+
+def design_table(design: Design, title: str, most: int = 40) -> None:
+    """A design in physical units; the middle is left out if it is long."""
+    table = Table(title=title, title_justify="left", header_style="bold", box=SIMPLE_HEAD)
+    table.add_column("run", justify="right")
+    for label in design.space.labels:
+        # A unit in brackets must not be taken for markup.
+        table.add_column(label.replace("[", "\\["), justify="right")
+    rows = list(enumerate(design.physical, start=1))
+    for i, row in rows if len(rows) <= most else rows[: most // 2] + rows[-most // 2 :]:
+        table.add_row(str(i), *(f"{v:.6g}" for v in row))
+    console.print(table)
+
+
+def summary(outcome: Outcome) -> None:
+    """The model in one table, and where everything is."""
+    model, trip = outcome.model, outcome.round_trip
+    table = Table(header_style="bold", title_justify="left", title=_title(outcome), box=SIMPLE_HEAD, padding=(0, 1))
+    table.add_column("response", no_wrap=True)
+    table.add_column("factors that act")
+    for heading in ("terms", "MAXABS", "of range", "RMSE", "round trip"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for j, (response, error) in enumerate(zip(model.responses, model.validation, strict=True)):
+        scale = response.shown_scale
+        loop = f"{trip.errors[j].max_abs * scale:.2e}" if trip.errors else "–"
+        table.add_row(
+            f"{response.symbol} \\[{response.shown_unit}]",
+            " ".join(outcome.screening.active_on(response.name)) or "none",
+            str(len(model.terms_of(j))),
+            f"{error.max_abs * scale:.2e}",
+            f"{100 * error.max_relative:.2g} %",
+            f"{error.rmse * scale:.2e}",
+            loop,
+        )
+    console.print(table)
+    if outcome.screening.flagged_dummies:
+        console.print("Dummy columns carry more than noise: interactions or curvature act as well.", style="yellow")
+    if model.certificate:
+        console.print(f"Inverse: {model.certificate.verdict}; {model.certificate.reason}.")
+    answered = len(trip.targets) - trip.n_refused
+    console.print(f"Round trip: {answered} of {len(trip.targets)} responses inverted and confirmed by the oracle.")
+    seconds = np.sum(list(outcome.seconds.values()))
+    console.print(f"Took {seconds:.1f} s. Report: [bold]{outcome.path / 'report.html'}[/bold]", soft_wrap=True)
+    console.print(f"Model:  [bold]{outcome.path / 'model.json'}[/bold]", soft_wrap=True)
+    console.print(f"Code:   [bold]{outcome.path / 'exports'}[/bold]", soft_wrap=True)
+
+
+def _title(outcome: Outcome) -> str:
+    model = outcome.model
+    kind = "linear" if model.is_affine else f"degree-{model.terms.degrees.max()}"
+    return f"{outcome.study.config.name}: {kind} model, {model.validation[0].n_runs} fresh runs"
