@@ -94,11 +94,16 @@ def affine_inverse(model: "Surrogate") -> AffineInverse:
     centre, half = model.factors.centre, model.factors.half_range
     constant, slope = _affine_part(model)
     scaled = slope / model.scale[:, None]
-    inverse = np.linalg.pinv(scaled) / model.scale
-    gain = half[:, None] * inverse
+    inverse = np.linalg.pinv(scaled)
     singular = np.linalg.svd(scaled, compute_uv=False)
-    lost = singular[-1] <= max(scaled.shape) * np.finfo(float).eps * singular[0]
-    return AffineInverse(gain, centre - gain @ constant, np.inf if lost else float(singular[0] / singular[-1]))
+    rounding = max(scaled.shape) * np.finfo(float).eps
+    lost = singular[-1] <= rounding * singular[0]
+    condition = np.inf if lost else float(singular[0] / singular[-1])
+    if not lost:
+        # An entry within the inverse's own error is a structural zero: a controller need not multiply by it.
+        inverse[np.abs(inverse) <= rounding * condition * np.abs(inverse).max()] = 0.0
+    gain = half[:, None] * inverse / model.scale
+    return AffineInverse(gain, centre - gain @ constant, condition)
 
 
 def invert(model: "Surrogate", targets: ArrayLike) -> Inversion:

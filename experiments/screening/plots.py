@@ -31,7 +31,9 @@ def half_normal(ax: "Axes", result: LenthResult, response: Response) -> "Axes":
     crowded = 0
     for before, i in zip([-1, *np.flatnonzero(active)], np.flatnonzero(active), strict=False):
         # Symmetric mechanisms have equal effects side by side: stack the labels that would collide.
-        close = before >= 0 and quantile[i] - quantile[before] < 0.2 and size[i] - size[before] < 0.06 * top
+        letters = len(result.names[order[i]]) + len(result.names[order[before]])
+        near = quantile[i] - quantile[before] < 0.03 + 0.025 * letters and size[i] - size[before] < 0.06 * top
+        close = before >= 0 and near
         crowded = crowded + 1 if close else 0
         ax.annotate(result.names[order[i]], (quantile[i], size[i]), (0, 5 + 8 * crowded), textcoords="offset points",
                     ha="center", fontsize=7, color=ACTIVE)  # fmt: skip

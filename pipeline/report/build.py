@@ -53,6 +53,7 @@ def _content(outcome: Outcome, provenance: dict[str, Any]) -> dict[str, Any]:
         "coefficients": views.coefficients(outcome),
         "published": views.published(outcome),
         "validation": views.error_rows(outcome, model.validation),
+        "at_rounding": max(e.max_relative for e in model.validation) < 1e-12,
         "validation_failures": outcome.validation_runs.failures(),
         "validation_figures": [figures.validation_figure(outcome, j) for j in n],
         "certificate": views.certificate(outcome),

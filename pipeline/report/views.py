@@ -53,7 +53,7 @@ def headline(outcome: Outcome) -> list[dict[str, str]]:
         },
         {
             "label": "largest error",
-            "value": f"{number(worst.max_relative, 3)} of the range",
+            "value": f"{percent(worst.max_relative)} of the range",
             "note": f"on {worst.n_runs} fresh random runs, in {worst.response}",
         },
         {"label": "inverse", "value": verdict, "note": "no two settings in the box give the same responses"
