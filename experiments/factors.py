@@ -1,6 +1,7 @@
 """Factors and the one invertible border between physical and coded units."""
 
 import math
+import numbers
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
@@ -41,12 +42,14 @@ class Factor:
         check_name("factor", self.name)
         check_unit(self.name, self.unit)
         for end in (self.low, self.high):
-            if isinstance(end, bool) or not isinstance(end, (int, float)) or not math.isfinite(end):
+            if isinstance(end, bool) or not isinstance(end, numbers.Real) or not math.isfinite(end):
                 raise ValueError(f"factor {self.name!r}: low and high must be finite numbers, got {end!r}")
         if not self.low < self.high:
             raise ValueError(f"factor {self.name!r}: low must be below high, got low = {self.low}, high = {self.high}")
-        if not math.isfinite(self.high - self.low):
-            raise ValueError(f"factor {self.name!r}: the range {self.low} to {self.high} is too wide for float64")
+        if not (math.isfinite(self.high - self.low) and 0.5 * self.high - 0.5 * self.low > 0.0):
+            raise ValueError(
+                f"factor {self.name!r}: the range {self.low} to {self.high} is too wide or too narrow for float64"
+            )
 
     @property
     def label(self) -> str:
@@ -123,8 +126,10 @@ class FactorSpace:
 
     def with_ranges(self, ranges: Mapping[str, tuple[float, float]]) -> "FactorSpace":
         """A copy with other ranges, ``{name: (low, high)}``, in each factor's unit."""
-        for name in ranges:
+        for name, ends in ranges.items():
             self.index(name)
+            if len(ends) != 2:
+                raise ValueError(f"factor {name!r}: a range is (low, high), got {ends!r}")
         return FactorSpace(
             tuple(
                 replace(f, low=ranges[f.name][0], high=ranges[f.name][1], source="set by the user")

@@ -99,7 +99,10 @@ class Runs:
             raise ValueError(f"values must have shape {expected} (runs, responses); got {values.shape}")
         if not len(self.status) == len(self.reasons) == expected[0]:
             raise ValueError(f"need one status and one reason for each of {expected[0]} runs")
-        ok = np.array([s is Status.OK for s in self.status], dtype=bool)
+        if len({r.name for r in self.responses}) < len(self.responses):
+            raise ValueError(f"response names must differ; got {', '.join(r.name for r in self.responses)}")
+        object.__setattr__(self, "status", tuple(Status(s) for s in self.status))
+        ok = self.ok
         if not np.isfinite(values[ok]).all():
             raise ValueError("a run with status 'ok' has a response that is not finite")
         values[~ok] = np.nan

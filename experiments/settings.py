@@ -5,6 +5,7 @@ Oracles, designs and export targets are all made this way, from a config or from
 
 import dataclasses
 import math
+import numbers
 import typing
 from collections.abc import Mapping
 from typing import Any
@@ -35,7 +36,7 @@ def build(kind: str, cls: type, given: Mapping[str, Any]) -> Any:
         For an unknown key (with the nearest known one), a missing key, a wrong type, a number that
         is not finite, or whatever `cls` itself refuses.
     """
-    fields = {f.name: f for f in dataclasses.fields(cls) if f.init}
+    fields = _fields(cls)
     hints = typing.get_type_hints(cls)
     for key, value in given.items():
         if key not in fields:
@@ -50,18 +51,21 @@ def build(kind: str, cls: type, given: Mapping[str, Any]) -> Any:
 def describe(cls: type) -> list[dict[str, str]]:
     """Name, default, unit and explanation of every setting of `cls`, for ``flexdoce list`` and the docs."""
     rows = []
-    for f in dataclasses.fields(cls):
-        if f.init:
-            default = "required" if f.default is dataclasses.MISSING else repr(f.default)
-            rows.append(
-                {
-                    "name": f.name,
-                    "default": default,
-                    "unit": f.metadata.get("unit", ""),
-                    "about": f.metadata.get("about", ""),
-                }
-            )
+    for f in _fields(cls).values():
+        rows.append(
+            {
+                "name": f.name,
+                "default": "required" if f.default is dataclasses.MISSING else repr(f.default),
+                "unit": f.metadata.get("unit", ""),
+                "about": f.metadata.get("about", ""),
+            }
+        )
     return rows
+
+
+def _fields(cls: type) -> dict[str, dataclasses.Field]:
+    """Fields that can be set; none for a class that is no dataclass."""
+    return {f.name: f for f in dataclasses.fields(cls) if f.init} if dataclasses.is_dataclass(cls) else {}
 
 
 def _options(hint: Any) -> tuple[type, ...]:
@@ -71,16 +75,25 @@ def _options(hint: Any) -> tuple[type, ...]:
 
 def _check_type(kind: str, key: str, value: Any, hint: Any) -> None:
     options = _options(hint)
-    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    fits = type(value) in options or (float in options and is_number) or (value is None and type(None) in options)
+    is_number = isinstance(value, numbers.Real) and not isinstance(value, bool)
+    is_whole = isinstance(value, numbers.Integral) and not isinstance(value, bool)
+    fits = (
+        type(value) in options
+        or (float in options and is_number)
+        or (int in options and is_whole)
+        or (value is None and type(None) in options)
+    )
     if not fits:
         words = {float: "a number", int: "a whole number", str: "a text", bool: "true or false"}
         wanted = " or ".join(words.get(o, o.__name__) for o in options if o is not type(None))
         raise ValueError(f"{kind}: {key} must be {wanted}, got {value!r}")
-    if isinstance(value, float) and not math.isfinite(value):
+    if isinstance(value, numbers.Real) and not math.isfinite(value):
         raise ValueError(f"{kind}: {key} must be finite, got {value!r}")
 
 
 def _as_declared(value: Any, hint: Any) -> Any:
+    """Numbers as plain Python of the declared kind: an int where a float is declared, a NumPy scalar anywhere."""
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        return value
     options = _options(hint)
-    return float(value) if float in options and int not in options and isinstance(value, int) else value
+    return int(value) if int in options and isinstance(value, numbers.Integral) else float(value)

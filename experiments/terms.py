@@ -29,16 +29,21 @@ class Terms:
     Raises
     ------
     ValueError
-        If a row has the wrong length, an exponent is negative, or a term appears twice.
+        If a row has the wrong length, an exponent is negative or no whole number, or a name or a
+        term appears twice.
     """
 
     names: tuple[str, ...]
     exponents: tuple[tuple[int, ...], ...]
 
     def __post_init__(self) -> None:
+        if any(e != int(e) for row in self.exponents for e in row):
+            raise ValueError("exponents must be whole numbers")
         rows = tuple(tuple(int(e) for e in row) for row in self.exponents)
         object.__setattr__(self, "names", tuple(self.names))
         object.__setattr__(self, "exponents", rows)
+        if len(set(self.names)) < len(self.names):
+            raise ValueError(f"factor names must differ; got {', '.join(self.names)}")
         if any(len(row) != len(self.names) for row in rows):
             raise ValueError(f"each term needs {len(self.names)} exponents, one per factor")
         if any(e < 0 for row in rows for e in row):

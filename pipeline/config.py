@@ -31,7 +31,7 @@ class FactorRange(Table):
 
 
 class DesignTable(Table):
-    """A design method and its settings; ``flexdoce list`` names them."""
+    """A design method and its settings, which differ by method; ``flexdoce list`` names them."""
 
     model_config = ConfigDict(extra="allow", frozen=True, strict=True)
     __pydantic_extra__: dict[str, Setting] = Field(init=False)  # type: ignore[assignment]
@@ -42,6 +42,18 @@ class DesignTable(Table):
     def settings(self) -> dict[str, Any]:
         """The settings beside the method's name."""
         return dict(self.__pydantic_extra__ or {})
+
+
+class ScreeningDesign(DesignTable):
+    """An orthogonal two-level design."""
+
+    method: str = Field(default="plackett_burman", description="name of the design method")
+
+
+class FillDesign(DesignTable):
+    """A filling design; without ``n_runs`` it is sized from the factors that act."""
+
+    method: str = Field(default="uniform", description="name of the design method")
 
 
 class OracleTable(Table):
@@ -57,9 +69,7 @@ class OracleTable(Table):
 class ScreeningTable(Table):
     """Which factors act."""
 
-    design: DesignTable = Field(
-        default=DesignTable(method="plackett_burman"), description="orthogonal two-level design"
-    )
+    design: ScreeningDesign = ScreeningDesign()
     alpha: float = Field(default=0.05, gt=0.0, lt=1.0, description="error rate of Lenth's margins")
     keep: list[str] = Field(default=[], description="factors kept whatever the screening says")
 
@@ -67,10 +77,7 @@ class ScreeningTable(Table):
 class FitTable(Table):
     """The polynomial and the design that it is fitted on."""
 
-    design: DesignTable = Field(
-        default=DesignTable(method="uniform"),
-        description="filling design; without n_runs it is sized from the factors that act",
-    )
+    design: FillDesign = FillDesign()
     degree: int = Field(default=2, ge=1, le=5, description="highest total degree of the candidate terms")
     interactions: bool = Field(default=True, description="whether products of different factors are candidates")
     trim: bool = Field(default=True, description="whether terms that the data do not support are removed")

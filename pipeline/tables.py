@@ -21,7 +21,7 @@ CODED = "coded"
 
 def design_csv(design: Design) -> str:
     """A design in coded units, the dummy columns last."""
-    names = [*design.space.names, *(f"dummy{i + 1}" for i in range(design.dummies.shape[1]))]
+    names = [*design.space.names, *design.dummy_names]
     table = np.hstack([design.coded, design.dummies])
     return _csv(pd.DataFrame(table, columns=pd.Index([column_label(n, CODED) for n in names])))
 

@@ -12,7 +12,7 @@ from math import ceil
 from typing import Any
 
 from ..naming import suggestion
-from ..settings import build, describe
+from ..settings import build
 from .base import Design, DesignMethod
 from .discrepancy import centred_discrepancy_squared, level_discrepancy_squared
 from .plackett_burman import PlackettBurman
@@ -45,7 +45,7 @@ def get(method: str, settings: Mapping[str, Any] | None = None, at_least: float 
         Its settings; defaults where not given.
     at_least : float, optional
         If `n_runs` is not among the settings: take the smallest allowed number of runs that is at
-        least this (a multiple of ``levels``, where the method has levels).
+        least this.
 
     Raises
     ------
@@ -54,10 +54,15 @@ def get(method: str, settings: Mapping[str, Any] | None = None, at_least: float 
     """
     if method not in METHODS:
         raise ValueError(f"unknown design {method!r}{suggestion(method, METHODS)}")
-    cls, chosen = METHODS[method], dict(settings or {})
-    if at_least is not None and "n_runs" not in chosen:
-        defaults = {row["name"]: row["default"] for row in describe(cls)}
-        levels = chosen.get("levels", int(defaults.get("levels", 1)))
-        step = levels if isinstance(levels, int) and levels > 0 else 1
-        chosen["n_runs"] = step * ceil(at_least / step)
-    return build(f"design {method!r}", cls, chosen)
+    kind, cls, chosen = f"design {method!r}", METHODS[method], dict(settings or {})
+    if at_least is None or "n_runs" in chosen:
+        return build(kind, cls, chosen)
+    # Which sizes a method allows is the method's own business: take the first that it does not refuse.
+    smallest = ceil(at_least)
+    refusal = None
+    for n_runs in range(smallest, 2 * smallest + 64):
+        try:
+            return build(kind, cls, {**chosen, "n_runs": n_runs})
+        except ValueError as error:
+            refusal = refusal or error
+    raise refusal or ValueError(f"{kind} has no size of at least {smallest}")

@@ -67,15 +67,37 @@ class Design:
         """Settings in each factor's unit, shape (n_runs, n_factors)."""
         return self.space.decode(self.coded)
 
+    @property
+    def dummy_names(self) -> tuple[str, ...]:
+        """Names of the dummy columns, none of which is a factor's name."""
+        stem = "dummy"
+        while any(name.startswith(stem) for name in self.space.names):
+            stem += "_"
+        return tuple(f"{stem}{i + 1}" for i in range(self.dummies.shape[1]))
+
     def take(self, rows: ArrayLike) -> "Design":
         """The design of the given rows only."""
         rows = np.asarray(rows)
+        rows = rows if rows.size else rows.astype(int)
         return Design(self.space, self.coded[rows], self.method, self.dummies[rows])
 
     def embed(self, space: FactorSpace) -> "Design":
-        """The same settings in a larger `space`; factors it adds stay at the centre of their range."""
+        """The same physical settings in a larger `space`; factors it adds stay at the centre of their range.
+
+        Raises
+        ------
+        ValueError
+            If `space` lacks one of the factors, or has it in another unit.
+        """
         coded = np.zeros((len(self), len(space)))
-        coded[:, [space.index(name) for name in self.space.names]] = self.coded
+        for factor, column in zip(self.space, self.coded.T, strict=True):
+            j = space.index(factor.name)
+            there = space.factors[j]
+            if there.unit != factor.unit:
+                raise ValueError(f"factor {factor.name!r} is in {factor.unit!r} here and in {there.unit!r} there")
+            if (there.low, there.high) != (factor.low, factor.high):
+                column = FactorSpace((there,)).code(FactorSpace((factor,)).decode(column[:, None]))[:, 0]
+            coded[:, j] = column
         return Design(space, coded, self.method)
 
 

@@ -176,7 +176,10 @@ class PointOracle(Oracle):
         status, reasons = [Status.OK] * len(points), [""] * len(points)
         for i, point in enumerate(points):
             try:
-                values[i] = self.respond(point)
+                answer = np.asarray(self.respond(point), dtype=np.float64)
+                if answer.shape != values[i].shape:
+                    raise ValueError(f"respond gave shape {answer.shape}, not {values[i].shape}")
+                values[i] = answer
             except Exception as error:
                 status[i], reasons[i] = Status.CRASHED, f"{type(error).__name__}: {error}"
         return Answers(values, status, reasons)
@@ -194,13 +197,14 @@ class JaxOracle(Oracle):
     def evaluate(self, points: NDArray[np.float64]) -> Answers:
         """Answer in padded batches of :data:`CHUNK`."""
         self.prepare()
-        values = _in_chunks(self._batched, points)
+        values = _in_chunks(self._batched, points, (len(self.responses),))
         return Answers(values, [Status.OK] * len(points), [""] * len(points))
 
     def jacobian(self, points: ArrayLike) -> NDArray[np.float64]:
         """d response / d factor at `points` (n, n_factors), shape (n, n_responses, n_factors), SI."""
         self.prepare()
-        return _in_chunks(self._batched_jacobian, np.asarray(points, dtype=np.float64))
+        shape = (len(self.responses), len(self.factors))
+        return _in_chunks(self._batched_jacobian, np.asarray(points, dtype=np.float64), shape)
 
     @cached_property
     def _batched(self) -> Any:
@@ -215,13 +219,14 @@ class JaxOracle(Oracle):
         return jax.jit(jax.vmap(jax.jacfwd(self.respond)))
 
 
-def _in_chunks(function: Any, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _in_chunks(function: Any, points: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """`function` of all points, answers of `shape` each, in padded batches of one size."""
     import jax
 
-    answers = []
+    answers = [np.empty((0, *shape))]
     with jax.enable_x64(True):
         for start in range(0, len(points), CHUNK):
             chunk = points[start : start + CHUNK]
             padded = np.vstack([chunk, np.repeat(chunk[-1:], CHUNK - len(chunk), axis=0)])
             answers.append(np.asarray(function(padded))[: len(chunk)])
-    return np.concatenate(answers) if answers else np.empty((0, 0))
+    return np.concatenate(answers)

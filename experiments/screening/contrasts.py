@@ -58,9 +58,8 @@ def effects(runs: Runs) -> Effects:
     if not np.array_equal(with_mean.T @ with_mean, n_runs * np.eye(with_mean.shape[1])):
         raise ValueError("effects need an orthogonal, balanced design; this one's columns are correlated")
     names = runs.design.space.names
-    dummies = tuple(f"dummy{i + 1}" for i in range(runs.design.dummies.shape[1]))
     return Effects(
-        names + dummies,
+        names + runs.design.dummy_names,
         len(names),
         runs.responses,
         2.0 / n_runs * columns.T @ runs.values,

@@ -7,6 +7,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import t as student_t
 
+COLLAPSED = 1e-9
+"""A pseudo standard error below this fraction of the largest contrast is rounding, not experimental error."""
+
 
 @dataclass(frozen=True, eq=False)
 class LenthResult:
@@ -114,8 +117,8 @@ def lenth(
     freedom = m / 3.0
     gamma = 0.5 * (1.0 + (1.0 - alpha) ** (1.0 / m))
     advice = ""
-    if pse == 0.0 and size.any():
-        advice = "most contrasts are exactly zero, so no error can be estimated: give a noise_floor"
+    if size.any() and noise_floor == 0.0 and estimate <= COLLAPSED * size.max():
+        advice = "most contrasts are zero to rounding, so no error can be estimated: give a noise_floor"
     return LenthResult(
         names,
         contrasts,

@@ -1,0 +1,17 @@
+"""``python -m benchmarks``: all tables, as Markdown, with machine, versions and date."""
+
+import os
+import platform
+from datetime import UTC, datetime
+from importlib.metadata import version
+
+from . import fea_load_cases, study, uniform_designs
+
+PACKAGES = ("numpy", "scipy", "jax", "pyDOE3")
+
+if __name__ == "__main__":
+    versions = ", ".join(f"{p} {version(p)}" for p in PACKAGES)
+    print(f"{datetime.now(UTC):%Y-%m-%d}, {platform.processor() or platform.machine()}, {os.cpu_count()} cores, ")
+    print(f"Python {platform.python_version()}, {versions}.\n")
+    for module in (uniform_designs, fea_load_cases, study):
+        print(module.table(), flush=True)

@@ -1,0 +1,60 @@
+"""What the documents show is run: configs resolve, code blocks execute."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+import pipeline
+from experiments import oracles
+from pipeline.config import parse_config
+
+ROOT = Path(__file__).parents[1]
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+
+
+def blocks(name, language):
+    return [code for lang, code in BLOCK.findall((ROOT / name).read_text(encoding="utf-8")) if lang == language]
+
+
+@pytest.fixture
+def registry(monkeypatch):
+    monkeypatch.setattr(oracles, "_REGISTERED", {})
+
+
+def test_readme_config_resolves():
+    (text,) = blocks("README.md", "toml")
+    study = pipeline.resolve(parse_config(text, "README.md"))
+    assert study.space.factors[0].high == 0.5
+
+
+def test_readme_example_without_a_config_runs():
+    code = next(code for code in blocks("README.md", "python") if "PlackettBurman" in code)
+    names = {}
+    exec(compile(code, "README.md", "exec"), names)
+    assert names["screen"](names["runs"], resolution=1e-9).active_on("x") == ("T1D1", "T2D1", "T3D1")
+
+
+def test_readme_model_example_runs(tmp_path, monkeypatch):
+    settings = ["fit.design.budget=500", "validation.n_runs=20"]
+    pipeline.run(ROOT / "configs" / "hexflex.toml", tmp_path / "runs" / "hexflex", settings)
+    monkeypatch.chdir(tmp_path)
+    code = next(code for code in blocks("README.md", "python") if "model.invert" in code)
+    names = {}
+    exec(compile(code, "README.md", "exec"), names)
+    assert names["answer"].ok.all()
+
+
+def test_readme_test_command_is_what_ci_runs():
+    assert "make test" in (ROOT / "README.md").read_text(encoding="utf-8")
+    assert "make test" in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+
+
+def test_add_an_oracle_page_runs(registry, tmp_path):
+    names = {}
+    for code in blocks("docs/add-an-oracle.md", "python"):
+        exec(compile(code, "docs/add-an-oracle.md", "exec"), names)
+    config = tmp_path / "spring.toml"
+    config.write_text('name = "spring"\nvalidation.n_runs = 20\n[oracle]\nname = "spring"\n', encoding="utf-8")
+    outcome = pipeline.run(config, tmp_path / "run", ["fit.design.budget=200"])
+    assert outcome.kept == ("force", "stiffness") or outcome.kept == ("force",)
