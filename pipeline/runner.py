@@ -14,7 +14,7 @@ from surrogates import Surrogate, dumps, exports, loads
 
 from . import stages, tables
 from .config import load_config
-from .errors import InputError, RequirementNotMet
+from .errors import InputError
 from .executors import Progress, execute, silent
 from .provenance import provenance_json
 from .stages import RoundTrip
@@ -62,7 +62,6 @@ def run(
     overrides: Sequence[str] = (),
     fresh: bool = False,
     progress: Progress = silent,
-    strict: bool = False,
 ) -> Outcome:
     """Run or continue the study in a config file.
 
@@ -77,8 +76,6 @@ def run(
         Start anew in a folder that belongs to a study already.
     progress : callable
         Told the stage, the runs done and the runs in all.
-    strict : bool
-        Whether an unmet requirement raises; if not, it is in the outcome's ``shortfalls``.
 
     Raises
     ------
@@ -86,15 +83,14 @@ def run(
         If the config or the folder is wrong; nothing is touched then.
     TooManyFailures
         If more runs failed than the config tolerates.
-    RequirementNotMet
-        If `strict` and a declared requirement does not hold; everything is written first.
+
+    Notes
+    -----
+    A declared requirement that does not hold is no error here: it is in the outcome's ``shortfalls``.
     """
     study = resolve(load_config(config, overrides))
     folder = RunFolder.claim(Path(out) if out is not None else Path("runs") / study.config.name, study.config, fresh)
-    outcome = _Runner(study, folder, progress).run()
-    if strict and outcome.shortfalls:
-        raise RequirementNotMet("; ".join(outcome.shortfalls))
-    return outcome
+    return _Runner(study, folder, progress).run()
 
 
 class _Runner:
@@ -116,7 +112,7 @@ class _Runner:
             fill = stages.fill_design(study, kept)
         with self._timed("fit"):
             fit_runs = self._executed("fit", fill)
-            model, _ = stages.fitted(study, kept, fit_runs)
+            model = stages.fitted(study, kept, fit_runs)
         with self._timed("validation"):
             validation_runs = self._executed("validation", stages.validation_design(study))
             model = stages.validated(study, model, validation_runs)

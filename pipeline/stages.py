@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 
+import surrogates
 from experiments.designs import Design, Random
 from experiments.runs import Runs
 from experiments.screening import Screening, screen
-from surrogates import Inversion, PolynomialRegressor, ResponseError, Surrogate, Verdict, certify, errors
+from surrogates import Inversion, ResponseError, Surrogate, Verdict, certify, errors
 from surrogates.validation import compare
 
 from .config import dump_config
@@ -74,7 +75,7 @@ def validation_design(study: Study) -> Design:
     return Random(study.config.validation.n_runs).generate(study.space, study.seed("validation"))
 
 
-def fitted(study: Study, kept: tuple[str, ...], runs: Runs) -> tuple[Surrogate, PolynomialRegressor]:
+def fitted(study: Study, kept: tuple[str, ...], runs: Runs) -> Surrogate:
     """The trimmed polynomial on the kept factors, as a model of all factors."""
     tolerate(study, runs, "fit")
     done = runs.completed()
@@ -84,7 +85,8 @@ def fitted(study: Study, kept: tuple[str, ...], runs: Runs) -> tuple[Surrogate, 
     if len(done) < needed:
         raise TooManyFailures(f"{len(done)} runs are left for {needed} candidate terms: {runs.failures()}")
     fit = study.config.fit
-    regressor = PolynomialRegressor(
+    # Taken from the package when it is needed: the estimator brings scikit-learn.
+    regressor = surrogates.PolynomialRegressor(
         degree=fit.degree,
         interactions=fit.interactions,
         trim=fit.trim,
@@ -93,7 +95,7 @@ def fitted(study: Study, kept: tuple[str, ...], runs: Runs) -> tuple[Surrogate, 
         responses=study.oracle.responses,
     ).fit(done.design.physical[:, columns], done.values)
     surrogate = widened(regressor.surrogate_, study, columns)
-    return replace(surrogate, certificate=certify(surrogate), provenance=provenance(study, kept)), regressor
+    return replace(surrogate, certificate=certify(surrogate), provenance=provenance(study, kept))
 
 
 def widened(surrogate: Surrogate, study: Study, columns: list[int]) -> Surrogate:

@@ -4,7 +4,7 @@ import hashlib
 import json
 import shutil
 import sqlite3
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from .config import Config, differences, dump_config, parse_config
 from .errors import InputError
 
 CONFIG, POINTS = "config.toml", "points.sqlite"
+ASKED_AT_ONCE = 500  # SQLite allows at least 999 placeholders in a query
 OURS = (
     CONFIG, "provenance.json", POINTS, f"{POINTS}-journal", "model.json", "report.html",
     "screening", "fit", "validation", "inversion", "exports",
@@ -145,12 +146,15 @@ class PointStore:
             for row in (points + 0.0).tolist()
         ]
 
-    def known(self, keys: Iterable[str]) -> dict[str, tuple[list[float], Status, str]]:
+    def known(self, keys: Sequence[str]) -> dict[str, tuple[list[float], Status, str]]:
         """Stored answers by key, for those keys that have one."""
-        wanted, found = set(keys), {}
+        wanted, found = list(keys), {}
         with closing(self._connect()) as db:
-            for key, values, status, reason in db.execute("SELECT key, responses, status, reason FROM points"):
-                if key in wanted:
+            for start in range(0, len(wanted), ASKED_AT_ONCE):
+                some = wanted[start : start + ASKED_AT_ONCE]
+                marks = ", ".join("?" * len(some))
+                query = f"SELECT key, responses, status, reason FROM points WHERE key IN ({marks})"
+                for key, values, status, reason in db.execute(query, some):
                     numbers = [np.nan if v is None else v for v in json.loads(values)]
                     found[key] = (numbers, Status(status), reason)
         return found

@@ -110,6 +110,7 @@ class DesignMethod(Protocol):
     """
 
     method: ClassVar[str]
+    title: ClassVar[str]
     summary: ClassVar[str]
 
     def generate(self, space: FactorSpace, rng: Seed = 0) -> Design:

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from pyDOE3 import pbdesign
 
 from ..factors import FactorSpace
 from ..settings import parameter
@@ -46,6 +45,7 @@ class PlackettBurman:
     """
 
     method: ClassVar[str] = "plackett_burman"
+    title: ClassVar[str] = "Plackett–Burman design"
     summary: ClassVar[str] = "two-level orthogonal screening of main effects, with dummy columns"
 
     n_runs: int | None = parameter(None, "runs", "4·2^i, 12·2^i or 20·2^i; default leaves four dummies")
@@ -64,6 +64,8 @@ class PlackettBurman:
 
     def generate(self, space: FactorSpace, rng: Seed = 0) -> Design:
         """The design on `space`; nothing in it is random, so `rng` is not used."""
+        from pyDOE3 import pbdesign  # brings SciPy with it, which a surrogate that only predicts does not need
+
         n_factors = len(space)
         n_runs = self.n_runs or _smallest(n_factors)
         if n_factors > n_runs - 1:

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from scipy.stats import qmc
 
 from ..factors import FactorSpace
 from ..settings import parameter
@@ -27,6 +26,7 @@ class LatinHypercube:
     """
 
     method: ClassVar[str] = "latin_hypercube"
+    title: ClassVar[str] = "Latin hypercube"
     summary: ClassVar[str] = "one run in each of n equal slices of every factor"
 
     n_runs: int = parameter(30, "runs", "any number")
@@ -36,6 +36,8 @@ class LatinHypercube:
 
     def generate(self, space: FactorSpace, rng: Seed = 0) -> Design:
         """The design on `space`."""
+        from scipy.stats import qmc  # slow to import, and not needed by a surrogate that only predicts
+
         # scipy's optimiser divides by n - 1: a single run has nothing to exchange.
         optimization = "random-cd" if self.n_runs > 2 and len(space) > 1 else None
         sampler = qmc.LatinHypercube(len(space), rng=np.random.default_rng(rng), optimization=optimization)
@@ -53,6 +55,7 @@ class Random:
     """
 
     method: ClassVar[str] = "random"
+    title: ClassVar[str] = "random design"
     summary: ClassVar[str] = "independent uniform random settings, for validation"
 
     n_runs: int = parameter(1000, "runs", "any number")

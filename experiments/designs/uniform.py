@@ -47,6 +47,7 @@ class Uniform:
     """
 
     method: ClassVar[str] = "uniform"
+    title: ClassVar[str] = "uniform design"
     summary: ClassVar[str] = "balanced space-filling U-type design, centred discrepancy minimised"
 
     n_runs: int = parameter(30, "runs", "a multiple of levels")

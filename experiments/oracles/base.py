@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, is_dataclass
+from dataclasses import asdict, dataclass, field, is_dataclass
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
@@ -73,10 +73,11 @@ class Arrow:
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """A mechanism at rest and displaced, for drawing."""
+    """A mechanism at rest and displaced, for drawing; `anchors` are the clamped points, (n_anchors, 3) in m."""
 
     lines: tuple[Line, ...]
     arrows: tuple[Arrow, ...] = ()
+    anchors: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
 
 
 class Oracle(ABC):

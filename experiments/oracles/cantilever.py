@@ -81,4 +81,4 @@ class Cantilever(JaxOracle):
         line = load * x**2 * (3.0 * length - x) / (6.0 * bending)
         at_rest, moved = np.column_stack([x, zero, zero]), np.column_stack([zero, zero, line])
         tip = Arrow("load", at_rest[-1], moved[-1], np.array([0.0, 0.0, np.sign(load)]))
-        return Shape((Line("leaf", at_rest, moved),), (tip,))
+        return Shape((Line("leaf", at_rest, moved),), (tip,), at_rest[:1])

@@ -150,7 +150,8 @@ class HexFlex(JaxOracle):
             for factor, force, direction in zip(self.factors, point, self._directions, strict=True)
             if force != 0.0
         ]
-        return Shape((*beams, *body), tuple(arrows))
+        anchors = np.array([self.frame.nodes[name] for name in self.frame.clamps])
+        return Shape((*beams, *body), tuple(arrows), anchors)
 
     def _outline(self) -> tuple[str, ...]:
         """Roots in the order in which they go round the platform, closed."""

@@ -9,7 +9,7 @@ from .base import Shape
 if TYPE_CHECKING:
     from mpl_toolkits.mplot3d.axes3d import Axes3D
 
-REST, MOVED, RIGID, LOAD = "#cbd5e1", "#1d4ed8", "#0f172a", "#c2410c"
+REST, MOVED, RIGID, LOAD, ANCHOR = "#94a3b8", "#1d4ed8", "#0f172a", "#c2410c", "#475569"
 
 
 def size(shape: Shape) -> float:
@@ -18,7 +18,7 @@ def size(shape: Shape) -> float:
     return float(np.ptp(points, axis=0).max())
 
 
-def exaggeration(shape: Shape, visible: float = 0.15) -> float:
+def exaggeration(shape: Shape, visible: float = 0.25) -> float:
     """A round factor (1, 2 or 5 times a power of ten) that shows the largest displacement as `visible` of the size."""
     largest = max(float(np.linalg.norm(line.displacement, axis=1).max()) for line in shape.lines)
     if largest == 0.0:
@@ -32,10 +32,12 @@ def draw_shape(ax: "Axes3D", shape: Shape, factor: float | None = None) -> "Axes
     """Draw the displaced mechanism, displacements times `factor`, over the mechanism at rest (in mm)."""
     factor = exaggeration(shape) if factor is None else factor
     for line in shape.lines:
-        ax.plot(*(1e3 * line.points.T), color=REST, lw=1.2, zorder=1)
+        ax.plot(*(1e3 * line.points.T), color=REST, lw=1.0, ls=(0, (4, 2)), zorder=1)
     for line in shape.lines:
         color, width = (RIGID, 2.2) if line.rigid else (MOVED, 1.8)
         ax.plot(*(1e3 * (line.points + factor * line.displacement).T), color=color, lw=width, zorder=2)
+    if len(shape.anchors):
+        ax.plot(*(1e3 * shape.anchors.T), "s", color=ANCHOR, ms=5, zorder=3)
     reach = 0.12 * size(shape)
     for arrow in shape.arrows:
         foot = 1e3 * (arrow.point + factor * arrow.displacement)

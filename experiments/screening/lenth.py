@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import t as student_t
+from scipy.special import stdtrit
 
 COLLAPSED = 1e-9
 """A pseudo standard error below this fraction of the largest contrast is rounding, not experimental error."""
@@ -124,8 +124,8 @@ def lenth(
         contrasts,
         s0,
         pse,
-        float(student_t.ppf(1.0 - 0.5 * alpha, freedom)) * pse,
-        float(student_t.ppf(gamma, freedom)) * pse,
+        float(stdtrit(freedom, 1.0 - 0.5 * alpha)) * pse,
+        float(stdtrit(freedom, gamma)) * pse,
         alpha,
         noise_floor,
         noise_floor > estimate,

@@ -6,6 +6,8 @@ from typing import Any
 
 from jinja2 import Environment, StrictUndefined
 
+from experiments.designs import METHODS
+
 from ..runner import Outcome
 from . import figures, views
 
@@ -44,6 +46,7 @@ def _content(outcome: Outcome, provenance: dict[str, Any]) -> dict[str, Any]:
         "requirements": config.require.model_dump(exclude_none=True),
         "activity": views.activity(outcome),
         "flagged": outcome.screening.flagged_dummies,
+        "screening_title": METHODS[config.screening.design.method].title,
         "screening_runs": len(outcome.screening_runs),
         "screening_figures": [figures.screening_figure(outcome, j) for j in n],
         "fill": views.fill(outcome),

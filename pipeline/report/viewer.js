@@ -47,7 +47,9 @@
     const now = cases[chosen], factor = now.factor * gain;
     const flat = now.lines.flatMap((l) => l.rest);
     const middle = [0, 1, 2].map((i) => (Math.min(...flat.map((p) => p[i])) + Math.max(...flat.map((p) => p[i]))) / 2);
-    const zoom = (0.7 * H) / now.size;
+    const seen = now.lines.flatMap((l) => l.rest.concat(l.rest.map((p, i) => moved({ rest: p, move: l.move[i] }, 2 * now.factor))));
+    const reach = Math.max(...seen.map((p) => Math.hypot(...p.map((v, i) => v - middle[i]))));
+    const zoom = (0.5 * H - 26) / (0.88 * reach);
     const place = (p) => {
       const q = project(p.map((v, i) => v - middle[i]));
       return [W / 2 + zoom * q[0], H / 2 + zoom * q[1]];
@@ -55,18 +57,26 @@
     const path = (points) => points.map((p) => place(p).map((v) => v.toFixed(1)).join(",")).join(" ");
     svg.replaceChildren();
     for (const l of now.lines)
-      add("polyline", { points: path(l.rest), fill: "none", stroke: "#cbd5e1", "stroke-width": 2.5, "stroke-linejoin": "round" });
+      add("polyline", { points: path(l.rest), fill: "none", stroke: "#94a3b8", "stroke-width": 1.8, "stroke-dasharray": "7 4", "stroke-linejoin": "round" });
     for (const l of now.lines) {
       const points = l.rest.map((p, i) => moved({ rest: p, move: l.move[i] }, factor));
       add("polyline", { points: path(points), fill: "none", stroke: l.rigid ? "#0f172a" : "#1d4ed8", "stroke-width": l.rigid ? 4 : 3, "stroke-linecap": "round", "stroke-linejoin": "round" });
     }
+    for (const p of now.anchors) {
+      const [x, y] = place(p);
+      add("rect", { x: x - 5, y: y - 5, width: 10, height: 10, fill: "#475569" });
+    }
+    const taken = [];
     for (const a of now.arrows) {
       const foot = moved(a, factor), head = foot.map((v, i) => v + 0.12 * now.size * a.direction[i]);
       const [x1, y1] = place(foot), [x2, y2] = place(head);
       const angle = Math.atan2(y2 - y1, x2 - x1), wing = (t) => `${x2 - 11 * Math.cos(angle + t)},${y2 - 11 * Math.sin(angle + t)}`;
       add("line", { x1, y1, x2, y2, stroke: "#c2410c", "stroke-width": 2 });
       add("polygon", { points: `${x2},${y2} ${wing(0.4)} ${wing(-0.4)}`, fill: "#c2410c" });
-      add("text", { x: x2 + 8 * Math.cos(angle), y: y2 + 8 * Math.sin(angle) + 5, fill: "#c2410c", "font-size": 15, "text-anchor": Math.cos(angle) < -0.3 ? "end" : "start" }, a.label);
+      const text = { x: x2 + 8 * Math.cos(angle), y: y2 + 8 * Math.sin(angle) + 5 };
+      while (taken.some((t) => Math.abs(t.x - text.x) < 45 && Math.abs(t.y - text.y) < 15)) text.y -= 16;
+      taken.push(text);
+      add("text", { x: text.x, y: text.y, fill: "#c2410c", "font-size": 15, "text-anchor": Math.cos(angle) < -0.3 ? "end" : "start" }, a.label);
     }
     [[1, 0, 0], [0, 1, 0], [0, 0, 1]].forEach((axis, i) => {
       const q = project(axis);

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.designs import level_discrepancy_squared
+from experiments.designs import METHODS, level_discrepancy_squared
 from experiments.oracles import Shape
 from experiments.oracles.plots import exaggeration, size
 from surrogates import Verdict, affine_inverse
@@ -112,7 +112,7 @@ def fill(outcome: Outcome) -> dict[str, Any]:
     levels = {len(np.unique(np.round(c, 9))) for c in settings.T}
     few = max(levels) < len(design)
     return {
-        "method": design.method,
+        "title": METHODS[design.method].title,
         "n_runs": len(design),
         "n_factors": len(columns),
         "levels": max(levels) if few else None,
@@ -244,6 +244,7 @@ def viewer_data(cases: list[tuple[str, Shape]]) -> str:
             "label": label,
             "factor": exaggeration(shape),
             "size": _short(1e3 * size(shape)),
+            "anchors": _short(1e3 * shape.anchors) if len(shape.anchors) else [],
             "lines": [
                 {"rest": _short(1e3 * line.points), "move": _short(1e3 * line.displacement), "rigid": line.rigid}
                 for line in shape.lines

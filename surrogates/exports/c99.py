@@ -7,7 +7,6 @@ from string import Template
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.designs.base import check_count
 from experiments.settings import parameter
@@ -125,7 +124,7 @@ def _affine(model: "Surrogate") -> dict[str, str]:
     """Constant Jacobian and closed-form inverse."""
     centre = model.factors.centre
     slope, constant = model.jacobian(centre[None])[0], model.predict(centre[None])[0]
-    gain = _without_rounding(affine_inverse(model).gain, model.scale)
+    gain = affine_inverse(model).gain
     moves = [
         f"    const double d_{r.name} = responses[{j}]{_less(constant[j])};"
         for j, r in enumerate(model.responses)
@@ -162,12 +161,6 @@ def _polynomial(model: "Surrogate") -> dict[str, str]:
         "scale": _list(model.scale),
         "decoding": "\n".join(_sum(f"settings[{i}]", [(c, ()), (h, (f"coded[{i}]",))]) for i, (c, h) in scaling),
     }
-
-
-def _without_rounding(gain: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The gain with zeros where its entry is only the rounding of its row, as in a map that falls into blocks."""
-    size = np.abs(gain * scale)
-    return np.where(size > 16.0 * np.finfo(float).eps * size.max(axis=1, keepdims=True), gain, 0.0)
 
 
 def _product(model: "Surrogate", row: tuple[int, ...]) -> tuple[str, ...]:
