@@ -1,5 +1,6 @@
 """The stages: pure functions from one noun to the next. Nothing here touches the disk or runs an oracle."""
 
+import hashlib
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -167,5 +168,5 @@ def provenance(study: Study, kept: tuple[str, ...]) -> dict[str, Any]:
         "oracle_parameters": oracle.parameters,
         "seed": config.seed,
         "kept_factors": list(kept),
-        "config": dump_config(config),
+        "config_sha256": hashlib.sha256(dump_config(config).encode()).hexdigest(),
     }
