@@ -9,6 +9,7 @@ from .config import Config, load_config
 from .errors import FlexdoceError, InputError, RequirementNotMet, TooManyFailures
 from .runner import Outcome, read_run, run
 from .study import Study, resolve
+from .version import __version__
 
 __all__ = [
     "Config",
@@ -18,6 +19,7 @@ __all__ = [
     "RequirementNotMet",
     "Study",
     "TooManyFailures",
+    "__version__",
     "load_config",
     "read_run",
     "resolve",

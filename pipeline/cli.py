@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from . import commands
 from .errors import FlexdoceError
+from .version import __version__
 
 EPILOG = (
     "exit codes: 0 done; 2 bad config or arguments; 3 too many failed runs; "
@@ -39,6 +40,7 @@ def _parser() -> argparse.ArgumentParser:
         description="From a simulator of a compliant mechanism to a small, invertible, trusted formula.",
         epilog=EPILOG,
     )
+    parser.add_argument("--version", action="version", version=f"flexdoce {__version__}")
     verbs = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
     def verb(name: str, function: object, summary: str) -> argparse.ArgumentParser:

@@ -16,8 +16,7 @@ from surrogates.validation import compare
 from .config import dump_config
 from .errors import InputError, TooManyFailures
 from .study import Study
-
-VERSION = "0.1.0"
+from .version import __version__
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +159,7 @@ def provenance(study: Study, kept: tuple[str, ...]) -> dict[str, Any]:
     """Where a model comes from: no clock, host or path, so that the same study gives the same file."""
     config, oracle = study.config, study.oracle
     return {
-        "generator": f"flexdoce {VERSION}",
+        "generator": f"flexdoce {__version__}",
         "study": config.name,
         "oracle": oracle.name,
         "oracle_version": oracle.version,
