@@ -2,6 +2,7 @@
 
 import math
 import numbers
+import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
@@ -42,7 +43,7 @@ class Factor:
         check_name("factor", self.name)
         check_unit(self.name, self.unit)
         for end in (self.low, self.high):
-            if isinstance(end, bool) or not isinstance(end, numbers.Real) or not math.isfinite(end):
+            if isinstance(end, bool) or not isinstance(end, numbers.Real) or not abs(end) <= sys.float_info.max:
                 raise ValueError(f"factor {self.name!r}: low and high must be finite numbers, got {end!r}")
         if not self.low < self.high:
             raise ValueError(f"factor {self.name!r}: low must be below high, got low = {self.low}, high = {self.high}")

@@ -87,8 +87,15 @@ def _check_type(kind: str, key: str, value: Any, hint: Any) -> None:
         words = {float: "a number", int: "a whole number", str: "a text", bool: "true or false"}
         wanted = " or ".join(words.get(o, o.__name__) for o in options if o is not type(None))
         raise ValueError(f"{kind}: {key} must be {wanted}, got {value!r}")
-    if isinstance(value, numbers.Real) and not math.isfinite(value):
+    if isinstance(value, numbers.Real) and not _is_finite(value):
         raise ValueError(f"{kind}: {key} must be finite, got {value!r}")
+
+
+def _is_finite(value: numbers.Real) -> bool:
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # a whole number beyond float64
+        return False
 
 
 def _as_declared(value: Any, hint: Any) -> Any:

@@ -13,6 +13,7 @@ from . import tables
 from .config import dump_config, load_config
 from .console import console, design_table, progress_bars, summary
 from .errors import InputError, RequirementNotMet
+from .reading import read_points
 from .store import RunFolder
 from .study import resolve
 
@@ -61,7 +62,7 @@ def report(arguments: Namespace) -> None:
 def predict(arguments: Namespace) -> None:
     """``flexdoce predict``."""
     model = _model(arguments.model)
-    points = tables.read_points(_text(arguments.table), model.factors, _origin(arguments.table))
+    points = read_points(_text(arguments.table), model.factors, _origin(arguments.table))
     inside = model.contains(points)
     _emit(tables.prediction_csv(model, points, inside), arguments.out)
     if not inside.all():
@@ -71,7 +72,7 @@ def predict(arguments: Namespace) -> None:
 def invert(arguments: Namespace) -> None:
     """``flexdoce invert``."""
     model = _model(arguments.model)
-    targets = tables.read_points(_text(arguments.table), model.responses, _origin(arguments.table))
+    targets = read_points(_text(arguments.table), model.responses, _origin(arguments.table))
     inversion = model.invert(targets)
     _emit(tables.inversion_csv(targets, inversion, model.factors, model.responses), arguments.out)
     if not inversion.ok.all():

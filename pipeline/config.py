@@ -3,7 +3,7 @@
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -13,7 +13,8 @@ from experiments.naming import suggestion
 from .errors import InputError
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
-Setting = bool | int | Number | str
+Whole = Annotated[int, Field(ge=-(2**63), le=2**63 - 1)]
+Setting = bool | Whole | Number | str
 
 
 class Table(BaseModel):
@@ -95,7 +96,7 @@ class ValidationTable(Table):
 class RequireTable(Table):
     """What must hold; the command ends with exit code 4 if it does not."""
 
-    max_relative_error: float | None = Field(
+    max_relative_error: Number | None = Field(
         default=None, gt=0.0, description="largest error on fresh runs over the response's range, every response"
     )
     certified_inverse: bool = Field(default=False, description="whether the inverse must be certified")
@@ -111,7 +112,7 @@ class ExportTable(Table):
 class Config(Table):
     """A study, as written by a person."""
 
-    version: Literal[1] = Field(default=1, description="version of this format")
+    version: int = Field(default=1, ge=1, le=1, description="version of this format")
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", description="short name: letters, digits, underscores")
     title: str = Field(default="", description="one line for the report")
     seed: int = Field(default=0, ge=0, le=2**63 - 1, description="seed of everything random")
@@ -133,8 +134,8 @@ def load_config(path: str | Path, overrides: Sequence[str] = ()) -> Config:
         If the file cannot be read, is not TOML, or a key or value is not allowed.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
         raise InputError(f"cannot read the config {path}: {reason}") from None
     return parse_config(text, str(path), overrides)
@@ -144,7 +145,9 @@ def parse_config(text: str, origin: str = "config", overrides: Sequence[str] = (
     """As :func:`load_config`, from text; `origin` names it in messages."""
     try:
         document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError:
+        raise InputError(f"{origin} is not valid TOML: it is nested too deep") from None
+    except ValueError as error:
         raise InputError(f"{origin} is not valid TOML: {error}") from None
     for override in overrides:
         _apply(document, override)
@@ -166,6 +169,8 @@ def json_schema() -> dict[str, Any]:
 
 
 def _apply(document: dict[str, Any], override: str) -> None:
+    if not override.isprintable():
+        raise InputError(f"--set {override!r} has characters that cannot be printed")
     key, equals, value = override.partition("=")
     parts = [p.strip() for p in key.split(".")]
     if not equals or not all(parts):
@@ -173,7 +178,9 @@ def _apply(document: dict[str, Any], override: str) -> None:
     try:
         parsed = tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
-        parsed = value.strip()
+        parsed = value.strip()  # a word without quotes
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"--set {key}: {error}") from None
     table: Any = document
     for part in parts[:-1]:
         table = table.setdefault(part, {})
@@ -194,8 +201,12 @@ def _sentence(error: ValidationError) -> str:
         kind = "table" if first["loc"] == ("oracle",) else "key"
         return f"the {kind} {where!r} is missing"
     allowed = first["msg"].removeprefix("Input ").replace("valid ", "").replace("a integer", "a whole number")
+    if first["type"] in {"model_type", "model_attributes_type", "dict_type"}:
+        allowed = "should be a table"
     if _is_type_tag(first["loc"][-1]):
         allowed = "should be a finite number, a text, true or false"
+    if where == "version":
+        allowed = "should be 1"
     if "pattern" in (first.get("ctx") or {}):
         allowed = "should be letters, digits and underscores, starting with a letter"
     return f"{where} {allowed}, got {first['input']!r}"

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
@@ -60,7 +61,7 @@ def summary(outcome: Outcome) -> None:
     model, trip = outcome.model, outcome.round_trip
     table = Table(header_style="bold", title_justify="left", title=_title(outcome), box=SIMPLE_HEAD, padding=(0, 1))
     table.add_column("response", no_wrap=True)
-    table.add_column("factors that act")
+    table.add_column("factors that act", overflow="fold")
     for heading in ("terms", "MAXABS", "of range", "RMSE", "round trip"):
         table.add_column(heading, justify="right", no_wrap=True)
     for j, (response, error) in enumerate(zip(model.responses, model.validation, strict=True)):
@@ -83,9 +84,12 @@ def summary(outcome: Outcome) -> None:
     answered = len(trip.targets) - trip.n_refused
     console.print(f"Round trip: {answered} of {len(trip.targets)} responses inverted and confirmed by the oracle.")
     seconds = np.sum(list(outcome.seconds.values()))
-    console.print(f"Took {seconds:.1f} s. Report: [bold]{outcome.path / 'report.html'}[/bold]", soft_wrap=True)
-    console.print(f"Model:  [bold]{outcome.path / 'model.json'}[/bold]", soft_wrap=True)
-    console.print(f"Code:   [bold]{outcome.path / 'exports'}[/bold]", soft_wrap=True)
+    console.print(f"Took {seconds:.1f} s.")
+    places = {"Report": "report.html", "Model": "model.json"}
+    if outcome.study.config.export.targets:
+        places["Code"] = "exports"
+    for what, name in places.items():
+        console.print(f"{what + ':':<8}[bold]{escape(str(outcome.path / name))}[/bold]", soft_wrap=True)
 
 
 def _title(outcome: Outcome) -> str:

@@ -31,7 +31,9 @@ def execute(oracle: Oracle, design: Design, store: PointStore, stage: str, progr
     points = design.physical
     keys = store.keys(points)
     answers = store.known(keys)
-    missing = np.array([i for i, key in enumerate(keys) if key not in answers], dtype=int)
+    # A design may hold the same settings twice; they are paid for once.
+    first = {key: i for i, key in reversed(list(enumerate(keys)))}
+    missing = np.array(sorted(i for key, i in first.items() if key not in answers), dtype=int)
     progress(stage, len(points) - len(missing), len(points))
     for start in range(0, len(missing), oracle.batch):
         rows = missing[start : start + oracle.batch]

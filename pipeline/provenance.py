@@ -10,7 +10,10 @@ from datetime import datetime
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+from .errors import InputError
+
 PACKAGES = ("flexdoce", "numpy", "scipy", "scikit-learn", "pyDOE3", "pandas", "jax", "jaxlib", "matplotlib")
+KEYS = {"started", "finished", "seconds", "host", "platform", "processors", "python", "packages", "commit"}
 
 
 def provenance_json(started: datetime, finished: datetime, seconds: Mapping[str, float]) -> str:
@@ -27,6 +30,20 @@ def provenance_json(started: datetime, finished: datetime, seconds: Mapping[str,
         "commit": _commit(),
     }
     return json.dumps(document, indent=2) + "\n"
+
+
+def read_provenance(text: str) -> dict[str, Any]:
+    """What :func:`provenance_json` wrote; ``InputError`` if it is damaged."""
+    document: Any = None
+    try:
+        document = json.loads(text)
+        complete = isinstance(document, dict) and set(document) >= KEYS
+        complete = complete and all(isinstance(document[key], dict) for key in ("seconds", "packages"))
+    except (ValueError, RecursionError):
+        complete = False
+    if not complete:
+        raise InputError("provenance.json is damaged: run the study again")
+    return document
 
 
 def _version(package: str) -> str:

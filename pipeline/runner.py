@@ -7,16 +7,17 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
-from experiments.designs import Design
+from experiments.designs import Design, Random
 from experiments.runs import Runs
-from experiments.screening import Screening, screen
+from experiments.screening import Screening
 from surrogates import Surrogate, dumps, exports, loads
 
 from . import stages, tables
 from .config import load_config
-from .errors import InputError
+from .errors import FlexdoceError, InputError
 from .executors import Progress, execute, silent
-from .provenance import provenance_json
+from .provenance import provenance_json, read_provenance
+from .reading import Table, read_runs
 from .stages import RoundTrip
 from .store import RunFolder
 from .study import STAGES, Study, resolve
@@ -176,47 +177,50 @@ def read_run(path: str | Path) -> Outcome:
     """
     folder, config = RunFolder.existing(Path(path))
     study = resolve(config)
-    try:
-        model = loads(folder.read("model.json"))
-    except ValueError as error:
-        raise InputError(f"{folder.path / 'model.json'}: {error}") from None
+    model = _read_model(folder, study)
     runs = {stage: _read_stage(folder, study, stage) for stage in STAGES}
-    screening = screen(runs["screening"], config.screening.alpha, study.oracle.resolution)
-    targets = runs["validation"].completed()
-    inversion = model.invert(targets.values)
-    answers = runs["inversion"]
+    try:
+        screening = stages.screened(study, runs["screening"])
+        targets, inversion, design = stages.inversion_design(model, runs["validation"])
+        if len(design) != len(runs["inversion"]):
+            raise ValueError("its inversion does not belong to its validation")
+        trip = stages.round_trip(study, targets, inversion, runs["inversion"])
+        kept = stages.kept_factors(study, screening)
+    except (ValueError, FlexdoceError) as error:
+        raise InputError(f"the run folder {folder.path} is damaged: {error}; run the study again") from None
+    shortfalls = tuple(stages.shortfalls(study, model))
     return Outcome(
-        folder.path,
-        study,
-        runs["screening"],
-        screening,
-        stages.kept_factors(study, screening),
-        runs["fit"],
-        model,
-        runs["validation"],
-        stages.round_trip(study, targets, inversion, answers),
-        tuple(stages.shortfalls(study, model)),
-    )
+        folder.path, study, runs["screening"], screening, kept, runs["fit"], model, runs["validation"], trip, shortfalls
+    )  # fmt: skip
 
 
 def write_report(folder: RunFolder, outcome: Outcome) -> Path:
-    """Write ``report.html`` of a finished study."""
+    """Write ``report.html`` of a finished study; ``InputError`` if ``provenance.json`` is damaged."""
     from .report import report_html  # matplotlib and jinja2 are not needed before this
 
-    return folder.write("report.html", report_html(outcome, folder.read("provenance.json")))
+    return folder.write("report.html", report_html(outcome, read_provenance(folder.read("provenance.json"))))
+
+
+def _read_model(folder: RunFolder, study: Study) -> Surrogate:
+    where = folder.path / "model.json"
+    try:
+        model = loads(folder.read("model.json"))
+    except ValueError as error:
+        raise InputError(f"{where}: {error}") from None
+    if model.factors != study.space or model.responses != study.oracle.responses or not model.validation:
+        raise InputError(f"{where} is not the model of this study: run the study again")
+    return model
 
 
 def _read_stage(folder: RunFolder, study: Study, stage: str) -> Runs:
     method = {
         "screening": study.config.screening.design.method,
         "fit": study.config.fit.design.method,
-        "validation": "random",
-        "inversion": "inverse",
+        "validation": Random.method,
+        "inversion": stages.INVERSE,
     }[stage]
-    return tables.read_runs(
-        folder.read(f"{stage}/design.csv"),
-        folder.read(f"{stage}/runs.csv"),
-        study.space,
-        study.oracle.responses,
-        method,
+    design, runs = (
+        Table.parse(folder.read(f"{stage}/{name}.csv"), str(folder.path / stage / f"{name}.csv"))
+        for name in ("design", "runs")
     )
+    return read_runs(design, runs, study.space, study.oracle.responses, method)

@@ -18,6 +18,9 @@ from .errors import InputError, TooManyFailures
 from .study import Study
 from .version import __version__
 
+INVERSE = "inverse"
+"""Method of the design that an inversion makes."""
+
 
 @dataclass(frozen=True, eq=False)
 class RoundTrip:
@@ -117,7 +120,7 @@ def inversion_design(surrogate: Surrogate, runs: Runs) -> tuple[Runs, Inversion,
     """Invert the responses of the validation runs; the design holds the settings found."""
     targets = runs.completed()
     inversion = surrogate.invert(targets.values)
-    return targets, inversion, Design.from_physical(surrogate.factors, inversion.settings[inversion.ok], "inverse")
+    return targets, inversion, Design.from_physical(surrogate.factors, inversion.settings[inversion.ok], INVERSE)
 
 
 def round_trip(study: Study, targets: Runs, inversion: Inversion, answers: Runs) -> RoundTrip:

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from experiments.oracles import Answers, Oracle
 from experiments.runs import Status
 
-from .config import Config, differences, dump_config, parse_config
+from .config import Config, differences, dump_config, load_config
 from .errors import InputError
 
 CONFIG, POINTS = "config.toml", "points.sqlite"
 ASKED_AT_ONCE = 500  # SQLite allows at least 999 placeholders in a query
 OURS = (
-    CONFIG, "provenance.json", POINTS, f"{POINTS}-journal", "model.json", "report.html",
+    "provenance.json", POINTS, f"{POINTS}-journal", "model.json", "report.html",
     "screening", "fit", "validation", "inversion", "exports",
 )  # fmt: skip
 
@@ -47,28 +47,41 @@ class RunFolder:
         InputError
             If the folder holds something else or belongs to another config; nothing is touched then.
         """
+        try:
+            return cls._claim(path, config, fresh)
+        except OSError as error:
+            raise InputError(f"cannot use the output folder {path}: {error.strerror}") from None
+
+    @classmethod
+    def _claim(cls, path: Path, config: Config, fresh: bool) -> "RunFolder":
+        folder = cls(path)
         if path.exists() and not path.is_dir():
             raise InputError(f"the output folder {path} is a file; name a folder with --out")
+        owner = None
         if path.is_dir() and any(path.iterdir()):
             if not (path / CONFIG).is_file():
                 raise InputError(f"the folder {path} is not empty and is no run folder; name another with --out")
+            _, owner = cls.existing(path)
+            keys = differences(owner, config)
+            if keys and not fresh:
+                raise InputError(
+                    f"the folder {path} belongs to another config (different: {', '.join(keys)}); "
+                    "name another with --out, or start it anew with --fresh"
+                )
             if fresh:
-                cls(path)._empty()
-            else:
-                cls(path)._check_owner(config)
-        try:
-            path.mkdir(parents=True, exist_ok=True)
-            (path / CONFIG).write_text(dump_config(config), encoding="utf-8")
-        except OSError as error:
-            raise InputError(f"cannot write to the output folder {path}: {error.strerror}") from None
-        return cls(path)
+                folder._empty()
+        path.mkdir(parents=True, exist_ok=True)
+        if owner is None or differences(owner, config):
+            # A config.toml that says the same stays as it is: somebody may have written it by hand.
+            folder.write(CONFIG, dump_config(config))
+        return folder
 
     @classmethod
     def existing(cls, path: Path) -> tuple["RunFolder", Config]:
         """A run folder that is there already, with its config; ``InputError`` if it is none."""
         if not (path / CONFIG).is_file():
             raise InputError(f"{path} is not a run folder: it has no {CONFIG}")
-        return cls(path), parse_config((path / CONFIG).read_text(encoding="utf-8"), str(path / CONFIG))
+        return cls(path), load_config(path / CONFIG)
 
     def write(self, name: str, text: str) -> Path:
         """Write a file of the folder whole: a reader never sees half of it."""
@@ -90,17 +103,8 @@ class RunFolder:
         """The store of evaluated points for `oracle`."""
         return PointStore(self.path / POINTS, oracle)
 
-    def _check_owner(self, config: Config) -> None:
-        _, owner = RunFolder.existing(self.path)
-        keys = differences(owner, config)
-        if keys:
-            raise InputError(
-                f"the folder {self.path} belongs to another config (different: {', '.join(keys)}); "
-                "name another with --out, or start it anew with --fresh"
-            )
-
     def _empty(self) -> None:
-        """Remove what we write and nothing else."""
+        """Remove what we write and nothing else; the config is written over, if it differs."""
         for name in OURS:
             target = self.path / name
             if target.is_dir() and not target.is_symlink():
@@ -147,16 +151,32 @@ class PointStore:
         ]
 
     def known(self, keys: Sequence[str]) -> dict[str, tuple[list[float], Status, str]]:
-        """Stored answers by key, for those keys that have one."""
-        wanted, found = list(keys), {}
+        """Good answers by key, for those keys that have one: a failed point is tried again.
+
+        Raises
+        ------
+        InputError
+            If the store is damaged.
+        """
+        try:
+            return self._known(list(keys))
+        except (sqlite3.DatabaseError, ValueError, TypeError) as error:
+            raise InputError(f"the point store {self.path} is damaged ({error}); move it away or use --fresh") from None
+
+    def _known(self, wanted: list[str]) -> dict[str, tuple[list[float], Status, str]]:
+        found = {}
         with closing(self._connect()) as db:
             for start in range(0, len(wanted), ASKED_AT_ONCE):
                 some = wanted[start : start + ASKED_AT_ONCE]
                 marks = ", ".join("?" * len(some))
                 query = f"SELECT key, responses, status, reason FROM points WHERE key IN ({marks})"
                 for key, values, status, reason in db.execute(query, some):
-                    numbers = [np.nan if v is None else v for v in json.loads(values)]
-                    found[key] = (numbers, Status(status), reason)
+                    if Status(status) is not Status.OK:
+                        continue
+                    numbers = [float(v) for v in json.loads(values)]
+                    if len(numbers) != self._n_responses or not np.isfinite(numbers).all():
+                        raise ValueError(f"point {key[:8]} has {len(numbers)} answers, not {self._n_responses} numbers")
+                    found[key] = (numbers, Status.OK, reason)
         return found
 
     def add(self, keys: Sequence[str], points: NDArray[np.float64], answers: Answers) -> None:

@@ -10,6 +10,7 @@ from experiments import designs, oracles
 from experiments.designs import Design, DesignMethod
 from experiments.factors import FactorSpace
 from experiments.oracles import Oracle
+from experiments.screening import contrast_columns
 from experiments.terms import Terms
 from surrogates import Surrogate, exports
 
@@ -72,10 +73,11 @@ def resolve(config: Config) -> Study:
     screening = config.screening
     method = _checked("screening.design", lambda: designs.get(screening.design.method, screening.design.settings))
     design = _checked("screening.design", lambda: method.generate(space, _seed(config, "screening")))
-    if not design.dummies.shape[1] and not np.isin(design.coded, (-1.0, 1.0)).all():
-        raise InputError(
-            f"screening.design: {screening.design.method!r} is not a two-level design; use 'plackett_burman'"
-        )
+    try:
+        contrast_columns(design)
+    except ValueError as error:
+        named = f"screening.design: {screening.design.method!r} is not a two-level design that can be screened with"
+        raise InputError(f"{named} ({error}); use 'plackett_burman'") from None
     if design.coded.shape[1] + design.dummies.shape[1] < 3:
         raise InputError(
             "screening.design: Lenth's method needs at least 3 columns, factors and dummies together; use more runs"

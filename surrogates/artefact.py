@@ -3,14 +3,16 @@
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from experiments.factors import Factor, FactorSpace
 from experiments.runs import Response
+from experiments.settings import build
 from experiments.terms import Terms
 
 from .certificate import Certificate, Verdict
@@ -37,7 +39,7 @@ def dumps(model: Surrogate) -> str:
         "terms": list(model.terms.labels),
         "coefficients": {r.name: [float(c) for c in model.coefficients[:, j]] for j, r in enumerate(model.responses)},
         "affine": _affine(model),
-        "validation": [asdict(e) for e in model.validation],
+        "validation": [_error_dict(e) for e in model.validation],
         "certificate": asdict(model.certificate) if model.certificate else None,
         "provenance": dict(model.provenance),
     }
@@ -54,14 +56,14 @@ def loads(text: str) -> Surrogate:
     """
     try:
         document = json.loads(text, parse_constant=_refuse_constant)
-    except json.JSONDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise ValueError(f"not valid JSON: {error}") from None
     if not isinstance(document, Mapping) or document.get("schema") != SCHEMA:
         found = document.get("schema") if isinstance(document, Mapping) else type(document).__name__
         raise ValueError(f"not a model this version reads: expected schema {SCHEMA!r}, found {found!r}")
     try:
         return _surrogate(document)
-    except (KeyError, TypeError, AttributeError) as error:
+    except (KeyError, TypeError, AttributeError, OverflowError) as error:
         raise ValueError(f"a part of the model is missing or of the wrong kind: {error}") from None
 
 
@@ -102,29 +104,78 @@ def _affine(model: Surrogate) -> dict[str, Any] | None:
 
 
 def _surrogate(document: Mapping[str, Any]) -> Surrogate:
-    factors = FactorSpace(tuple(Factor(**f) for f in document["factors"]))
-    responses = tuple(Response(**r) for r in document["responses"])
-    names = [r.name for r in responses]
+    factors = FactorSpace(tuple(build("factor", Factor, f) for f in _list(document, "factors")))
+    responses = tuple(build("response", Response, r) for r in _list(document, "responses"))
+    names, terms = [r.name for r in responses], _list(document, "terms")
     if set(document["coefficients"]) != set(names):
         raise ValueError(f"coefficients must be given for {', '.join(names)}")
-    columns = [np.asarray(document["coefficients"][name], dtype=np.float64) for name in names]
-    if any(column.shape != (len(document["terms"]),) for column in columns):
+    columns = [_numbers(_list(document["coefficients"], name), f"coefficients of {name}") for name in names]
+    if any(len(column) != len(terms) for column in columns):
         raise ValueError("every response needs one coefficient per term")
-    certificate = document["certificate"]
-    if certificate is not None:
-        parts = dict(certificate)
-        parts["verdict"], parts["witness"] = Verdict(parts["verdict"]), tuple(parts["witness"])
-        certificate = Certificate(**parts)
+    errors = tuple(_error(e) for e in _list(document, "validation"))
+    if errors and [e.response for e in errors] != names:
+        raise ValueError(f"validation must be empty or name {', '.join(names)} in this order")
     return Surrogate(
         factors,
         responses,
-        Terms.parse(document["terms"], factors.names),
+        Terms.parse(terms, factors.names),
         np.column_stack(columns),
-        tuple(ResponseError(**e) for e in document["validation"]),
-        certificate,
+        errors,
+        _certificate(document["certificate"]),
         dict(document["provenance"]),
     )
 
 
+def _certificate(given: Any) -> Certificate | None:
+    if given is None:
+        return None
+    parts = dict(given)
+    verdict, witness, condition = Verdict(parts.pop("verdict")), _list(parts, "witness"), parts.pop("condition")
+    del parts["witness"]
+    words = build("certificate", _CertificateWords, parts)
+    return Certificate(
+        words.claim,
+        verdict,
+        words.method,
+        None if condition is None else float(_numbers([condition], "condition")[0]),
+        tuple(float(v) for v in _numbers(witness, "witness")),
+        words.reason,
+    )
+
+
+@dataclass(frozen=True)
+class _CertificateWords:
+    """The texts of a certificate, so that they are checked like every other object."""
+
+    claim: str
+    method: str
+    reason: str
+
+
+def _error_dict(error: ResponseError) -> dict[str, Any]:
+    """JSON has no infinity: an undefined relative error is null."""
+    parts = asdict(error)
+    return {**parts, "max_relative": parts["max_relative"] if math.isfinite(error.max_relative) else None}
+
+
+def _error(given: Any) -> ResponseError:
+    undefined = given["max_relative"] is None
+    error = build("validation", ResponseError, {**given, "max_relative": 0.0} if undefined else given)
+    return replace(error, max_relative=math.inf) if undefined else error
+
+
+def _list(document: Any, key: str) -> list[Any]:
+    value = document[key]
+    if not isinstance(value, list):
+        raise ValueError(f"{key} must be a list, got {value!r}")
+    return value
+
+
+def _numbers(values: list[Any], what: str) -> NDArray[np.float64]:
+    if any(isinstance(v, bool) or not isinstance(v, (int, float)) for v in values):
+        raise ValueError(f"{what} must be numbers")
+    return np.array([float(v) for v in values], dtype=np.float64)
+
+
 def _refuse_constant(word: str) -> Any:
-    raise ValueError(f"not valid JSON: {word} is not a number")
+    raise ValueError(f"{word} is not a number")

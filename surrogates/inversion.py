@@ -18,6 +18,12 @@ TARGET_TOLERANCE = 1e-9
 
 MAX_ITERATIONS = 50
 
+FAR = 1e6
+"""Targets farther from the centre than this many scales are searched for at this distance."""
+
+EXTRA_STARTS = 4
+"""Random starts of the bounded search, beside its two good ones, where those miss the target."""
+
 
 class InversionStatus(StrEnum):
     """What became of one target."""
@@ -133,9 +139,10 @@ def invert(model: "Surrogate", targets: ArrayLike) -> Inversion:
         )
     if not np.isfinite(targets).all():
         raise ValueError("targets must be finite")
-    coded = _gauss_newton(model, targets)
-    for i in np.flatnonzero(~_reached(model, coded, targets)):
-        coded[i] = _nearest_in_box(model, targets[i], coded[i])
+    near = _brought_near(model, targets)
+    coded = _gauss_newton(model, near)
+    for i in np.flatnonzero(~_reached(model, coded, near)):
+        coded[i] = _nearest_in_box(model, near[i], coded[i])
     ok = _reached(model, coded, targets)
     coded = np.clip(coded, -1.0, 1.0)
     nearest = model.predict_coded(coded)
@@ -145,7 +152,7 @@ def invert(model: "Surrogate", targets: ArrayLike) -> Inversion:
         tuple(InversionStatus.OK if k else InversionStatus.OUTSIDE for k in ok),
         settings,
         nearest,
-        np.linalg.norm((nearest - targets) / model.scale, axis=1),
+        _distance(nearest / model.scale, targets / model.scale),
     )
 
 
@@ -153,6 +160,27 @@ def _affine_part(model: "Surrogate") -> tuple[NDArray[np.float64], NDArray[np.fl
     """Value (n_responses,) and slope by coded factors (n_responses, n_factors) at the centre of the domain."""
     centre = np.zeros((1, len(model.factors)))
     return model.predict_coded(centre)[0], model.jacobian_coded(centre)[0]
+
+
+def _brought_near(model: "Surrogate", targets: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Targets beyond all reach, moved in along the line to the centre's response: what is nearest stays nearest.
+
+    Sums of squares of a target at 1e300 would overflow.
+    """
+    constant, _ = _affine_part(model)
+    offset = targets / model.scale - constant / model.scale
+    farthest = np.abs(offset).max(axis=1, keepdims=True)
+    far = farthest[:, 0] > FAR
+    moved = constant + np.divide(offset, farthest, where=farthest > 0.0, out=np.zeros_like(offset)) * FAR * model.scale
+    return np.where(far[:, None], moved, targets)
+
+
+def _distance(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Euclidean distance of rows, without overflow on the way."""
+    apart = np.abs(a - b)
+    largest = apart.max(axis=1)
+    unit = apart / np.where(largest > 0.0, largest, 1.0)[:, None]
+    return largest * np.sqrt((unit**2).sum(axis=1))
 
 
 def _reached(model: "Surrogate", coded: NDArray[np.float64], targets: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -169,31 +197,67 @@ def _gauss_newton(model: "Surrogate", targets: NDArray[np.float64]) -> NDArray[n
     if model.is_affine:
         return coded
     coded = np.clip(coded, -1.0, 1.0)
+    moving = np.arange(len(coded))
     for _ in range(MAX_ITERATIONS):
-        miss = (targets - model.predict_coded(coded)) / model.scale
-        steps = np.linalg.pinv(model.jacobian_coded(coded) / model.scale[:, None])
+        miss = (targets[moving] - model.predict_coded(coded[moving])) / model.scale
+        steps = np.linalg.pinv(model.jacobian_coded(coded[moving]) / model.scale[:, None])
         step = np.einsum("nkr,nr->nk", steps, miss)
         # Far outside the box the polynomial means nothing: keep the search near it.
-        coded = np.clip(coded + step, -2.0, 2.0)
-        if np.abs(step).max(initial=0.0) < 1e-14:
+        coded[moving] = np.clip(coded[moving] + step, -2.0, 2.0)
+        # Each target stops for itself, so that its answer does not depend on the others.
+        moving = moving[np.abs(step).max(axis=1) >= 1e-14]
+        if not moving.size:
             break
     return coded
 
 
 def _nearest_in_box(model: "Surrogate", target: NDArray[np.float64], start: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The coded settings in the box whose responses come nearest to one target (locally, if not affine)."""
-    from scipy.optimize import least_squares, lsq_linear
+    """The coded settings in the box whose responses come nearest to one target (locally, if not affine).
 
-    if model.is_affine:
-        constant, slope = _affine_part(model)
-        scaled = slope / model.scale[:, None]
-        return lsq_linear(scaled, (target - constant) / model.scale, bounds=(-1.0, 1.0), tol=1e-14).x
+    Gauss–Newton with the box kept in every linear step, which bounded-variable least squares solves
+    exactly; steps are halved until they help. Started where the free iteration ended, and from the
+    centre and random points if that does not reach the target.
+    """
+    starts = [start]
+    if not model.is_affine:
+        starts += [np.zeros_like(start), *np.random.default_rng(0).uniform(-1.0, 1.0, (EXTRA_STARTS, len(start)))]
+    best, best_miss = start, np.inf
+    for begin in starts:
+        found = _bounded_gauss_newton(model, target, np.clip(begin, -1.0, 1.0))
+        miss = float(np.linalg.norm(_miss(model, found, target)))
+        if miss < best_miss:
+            best, best_miss = found, miss
+        if best_miss <= 0.1 * TARGET_TOLERANCE:
+            break
+    return best
 
-    def miss(coded: NDArray[np.float64]) -> NDArray[np.float64]:
-        return (model.predict_coded(coded[None])[0] - target) / model.scale
 
-    def slope_at(coded: NDArray[np.float64]) -> NDArray[np.float64]:
-        return model.jacobian_coded(coded[None])[0] / model.scale[:, None]
+def _bounded_gauss_newton(
+    model: "Surrogate", target: NDArray[np.float64], coded: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    from scipy.optimize import lsq_linear
 
-    inside = np.clip(start, -1.0, 1.0)
-    return least_squares(miss, inside, slope_at, bounds=(-1.0, 1.0), xtol=1e-15, ftol=1e-15, gtol=1e-15).x
+    miss = _miss(model, coded, target)
+    for _ in range(MAX_ITERATIONS):
+        slope = model.jacobian_coded(coded[None])[0] / model.scale[:, None]
+        room = np.finfo(float).eps  # the solver wants the bounds apart
+        wanted = lsq_linear(slope, miss, bounds=(-1.0 - coded - room, 1.0 - coded + room), method="bvls").x
+        length = 1.0
+        while length > 1e-6:
+            trial = np.clip(coded + length * wanted, -1.0, 1.0)
+            trial_miss = _miss(model, trial, target)
+            if np.linalg.norm(trial_miss) < np.linalg.norm(miss):
+                break
+            length *= 0.5
+        else:
+            return coded
+        moved = np.abs(trial - coded).max()
+        coded, miss = trial, trial_miss
+        if moved < 1e-14:
+            break
+    return coded
+
+
+def _miss(model: "Surrogate", coded: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Target minus prediction at one coded point, in units of the scale, shape (n_responses,)."""
+    return (target - model.predict_coded(coded[None])[0]) / model.scale

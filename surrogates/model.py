@@ -95,11 +95,13 @@ class Surrogate:
 
     def predict_coded(self, coded: ArrayLike) -> NDArray[np.float64]:
         """As :meth:`predict`, from coded settings."""
-        return model_matrix(self.terms, coded) @ self.coefficients
+        with np.errstate(over="ignore", invalid="ignore"):  # far outside the domain a power may overflow
+            return model_matrix(self.terms, coded) @ self.coefficients
 
     def jacobian_coded(self, coded: ArrayLike) -> NDArray[np.float64]:
         """As :meth:`jacobian`, from and by coded settings."""
-        return np.einsum("npk,pr->nrk", model_matrix_gradient(self.terms, coded), self.coefficients)
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.einsum("npk,pr->nrk", model_matrix_gradient(self.terms, coded), self.coefficients)
 
     def terms_of(self, response: int) -> tuple[str, ...]:
         """Labels of the terms that the response at that position uses."""

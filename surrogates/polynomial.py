@@ -1,6 +1,7 @@
 """The estimator: scikit-learn's contract outside, a frozen :class:`Surrogate` as its result."""
 
 from collections.abc import Sequence
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -120,10 +121,14 @@ class PolynomialRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
     def _check_settings(self) -> None:
         if isinstance(self.degree, bool) or not isinstance(self.degree, (int, np.integer)) or self.degree < 1:
             raise ValueError(f"degree must be a whole number of at least 1, got {self.degree!r}")
-        if self.penalty is not None and not (np.isfinite(self.penalty) and self.penalty >= 0.0):
+        if self.penalty is not None and not _is_number_from_zero(self.penalty):
             raise ValueError(f"penalty must be None, 0 or a positive number, got {self.penalty!r}")
-        if not (np.isfinite(self.resolution) and self.resolution >= 0.0):
+        if not _is_number_from_zero(self.resolution):
             raise ValueError(f"resolution must be 0 or a positive number, got {self.resolution!r}")
+
+
+def _is_number_from_zero(value: Any) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool) and 0.0 <= float(value) < np.inf
 
 
 def _space_of(X: NDArray[np.float64], names: Any) -> FactorSpace:

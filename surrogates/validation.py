@@ -28,7 +28,8 @@ class ResponseError:
         Largest minus smallest true response over these runs, SI: the denominator of `max_relative`.
     max_relative : float
         ``max_abs / range``, dimensionless. A denominator of the response itself would be
-        meaningless near its zero.
+        meaningless near its zero. Where the response does not move, its largest absolute value
+        stands in for the range; infinite if that is zero and the error is not.
     rmse : float
         Root mean square error (Eq. 2.8), SI.
     worst_run : int
@@ -63,7 +64,8 @@ def compare(responses: tuple[Response, ...], truth: ArrayLike, predicted: ArrayL
         worst = int(np.argmax(size[:, j]))
         spread = float(np.ptp(truth[:, j]))
         largest = float(size[worst, j])
-        relative = largest / spread if spread > 0.0 else (0.0 if largest == 0.0 else np.inf)
+        measure = spread or float(np.abs(truth[:, j]).max())
+        relative = largest / measure if measure > 0.0 else (0.0 if largest == 0.0 else np.inf)
         rmse = float(np.sqrt(np.mean(size[:, j] ** 2)))
         found.append(ResponseError(response.name, len(truth), largest, spread, float(relative), rmse, worst))
     return tuple(found)

@@ -118,7 +118,9 @@ class DesignMethod(Protocol):
         ...
 
 
-def check_count(what: str, value: object, at_least: int) -> None:
-    """Raise ``ValueError`` unless `value` is a whole number of at least `at_least`."""
+def check_count(what: str, value: object, at_least: int, at_most: int = 10_000_000) -> None:
+    """Raise ``ValueError`` unless `value` is a whole number of at least `at_least` and at most `at_most`."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < at_least:
         raise ValueError(f"{what} must be a whole number of at least {at_least}, got {value!r}")
+    if value > at_most:
+        raise ValueError(f"{what} must be at most {at_most}, got a larger number")

@@ -14,6 +14,9 @@ from .discrepancy import centred_kernels, unit_levels
 HOTTEST, COLDEST = 1e-1, 1e-3
 """First and last temperature, as fractions of the typical change of CD₂² at the start."""
 
+MOST_RUNS = 2000
+"""Memory and work of one exchange grow with the square of the runs."""
+
 
 @dataclass(frozen=True)
 class Uniform:
@@ -55,8 +58,8 @@ class Uniform:
     budget: int = parameter(20_000, "exchanges", "work spent on lowering the discrepancy")
 
     def __post_init__(self) -> None:
-        check_count("levels of a uniform design", self.levels, 2)
-        check_count("n_runs of a uniform design", self.n_runs, 2)
+        check_count("levels of a uniform design", self.levels, 2, MOST_RUNS)
+        check_count("n_runs of a uniform design", self.n_runs, 2, MOST_RUNS)
         check_count("budget of a uniform design", self.budget, 0)
         if self.n_runs % self.levels:
             lower = self.n_runs // self.levels * self.levels

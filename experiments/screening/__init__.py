@@ -6,8 +6,8 @@
 (6.74, 5)
 """
 
-from .contrasts import Effects, effects
+from .contrasts import Effects, contrast_columns, effects
 from .lenth import LenthResult, lenth
 from .screen import Screening, screen
 
-__all__ = ["Effects", "LenthResult", "Screening", "effects", "lenth", "screen"]
+__all__ = ["Effects", "LenthResult", "Screening", "contrast_columns", "effects", "lenth", "screen"]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..designs.base import Design
 from ..runs import Response, Runs
 
 
@@ -49,14 +50,8 @@ def effects(runs: Runs) -> Effects:
     """
     if not runs.ok.all():
         raise ValueError(f"effects need every run of the design: {runs.failures()}")
-    columns = np.hstack([runs.design.coded, runs.design.dummies])
-    if not np.allclose(np.abs(columns), 1.0, rtol=0.0, atol=1e-12):
-        raise ValueError("effects need a two-level design: every coded setting must be -1 or +1")
-    columns = np.sign(columns)
+    columns = contrast_columns(runs.design)
     n_runs = len(columns)
-    with_mean = np.hstack([np.ones((n_runs, 1)), columns])
-    if not np.array_equal(with_mean.T @ with_mean, n_runs * np.eye(with_mean.shape[1])):
-        raise ValueError("effects need an orthogonal, balanced design; this one's columns are correlated")
     names = runs.design.space.names
     return Effects(
         names + runs.design.dummy_names,
@@ -65,3 +60,21 @@ def effects(runs: Runs) -> Effects:
         2.0 / n_runs * columns.T @ runs.values,
         np.abs(runs.values).max(axis=0),
     )
+
+
+def contrast_columns(design: Design) -> NDArray[np.float64]:
+    """The ±1 columns of a two-level design, factors first, then dummies, shape (n_runs, n_contrasts).
+
+    Raises
+    ------
+    ValueError
+        If a column is not two-level and balanced, or two columns are not orthogonal.
+    """
+    columns = np.hstack([design.coded, design.dummies])
+    if not np.allclose(np.abs(columns), 1.0, rtol=0.0, atol=1e-12):
+        raise ValueError("effects need a two-level design: every coded setting must be -1 or +1")
+    columns = np.sign(columns)
+    with_mean = np.hstack([np.ones((len(columns), 1)), columns])
+    if not np.array_equal(with_mean.T @ with_mean, len(columns) * np.eye(with_mean.shape[1])):
+        raise ValueError("effects need an orthogonal, balanced design; this one's columns are correlated")
+    return columns

@@ -1,6 +1,6 @@
 """Puts the report together: views and figures into the template."""
 
-import json
+from collections.abc import Mapping
 from importlib.resources import files
 from typing import Any
 
@@ -14,21 +14,21 @@ from . import figures, views
 _HERE = files("pipeline.report")
 
 
-def report_html(outcome: Outcome, provenance: str) -> str:
+def report_html(outcome: Outcome, provenance: Mapping[str, Any]) -> str:
     """The report as one HTML text that needs no other file.
 
     Parameters
     ----------
     outcome : Outcome
-    provenance : str
-        Text of ``provenance.json``.
+    provenance : mapping
+        Content of ``provenance.json``.
     """
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     template = environment.from_string(_read("template.html"))
-    return template.render(_content(outcome, json.loads(provenance)))
+    return template.render(_content(outcome, provenance))
 
 
-def _content(outcome: Outcome, provenance: dict[str, Any]) -> dict[str, Any]:
+def _content(outcome: Outcome, provenance: Mapping[str, Any]) -> dict[str, Any]:
     model, config = outcome.model, outcome.study.config
     cases = views.shapes(outcome)
     n = range(len(model.responses))

@@ -1,4 +1,4 @@
-"""Code generated from a surrogate alone, one file a target: ``get("c99").render(model, "hexflex")``.
+"""Code generated from a surrogate alone, one file a target: ``get("c99").render(model, "stage")``.
 
 A target is frozen settings and one pure method from a model to texts by file name; whoever calls it
 writes the files.
