@@ -61,8 +61,9 @@ def summary(outcome: Outcome) -> None:
     model, trip = outcome.model, outcome.round_trip
     table = Table(header_style="bold", title_justify="left", title=_title(outcome), box=SIMPLE_HEAD, padding=(0, 1))
     table.add_column("response", no_wrap=True)
-    table.add_column("factors that act", overflow="fold")
-    for heading in ("terms", "MAXABS", "of range", "RMSE", "round trip"):
+    widest = max(len(name) for name in outcome.study.space.names)
+    table.add_column("factors that act", overflow="fold", min_width=min(widest, 24))
+    for heading in ("terms", "MAXABS", "of range", "round trip"):
         table.add_column(heading, justify="right", no_wrap=True)
     for j, (response, error) in enumerate(zip(model.responses, model.validation, strict=True)):
         scale = response.shown_scale
@@ -73,7 +74,6 @@ def summary(outcome: Outcome) -> None:
             str(len(model.terms_of(j))),
             f"{error.max_abs * scale:.2e}",
             f"{100 * error.max_relative:.2g} %",
-            f"{error.rmse * scale:.2e}",
             loop,
         )
     console.print(table)

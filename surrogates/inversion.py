@@ -26,7 +26,10 @@ EXTRA_STARTS = 4
 
 
 class InversionStatus(StrEnum):
-    """What became of one target."""
+    """What became of one target: reached, or no setting in the domain was found that reaches it.
+
+    For an affine model the search is exact, so that `OUTSIDE` means that there is none.
+    """
 
     OK = "ok"
     OUTSIDE = "outside"
@@ -41,7 +44,7 @@ class Inversion:
     settings : ndarray, shape (n, n_factors)
         Settings in the factors' units; NaN where the target was refused.
     status : tuple of InversionStatus
-        ``ok``, or ``outside``: no setting in the domain reaches the target.
+        ``ok``, or ``outside``: refused.
     nearest_settings : ndarray, shape (n, n_factors)
         The settings that come nearest to the target; equal to `settings` where it was reached.
     nearest : ndarray, shape (n, n_responses)

@@ -20,6 +20,7 @@ from tests.surrogates.cases import box, points, surrogate, unit_box
     [
         PolynomialRegressor(),
         PolynomialRegressor(degree=1, penalty=0.0),
+        PolynomialRegressor(degree=3, interactions=False, trim=False),
     ]
 )
 def test_scikit_learn_contract(estimator, check):
