@@ -10,7 +10,7 @@ from .version import __version__
 
 EPILOG = (
     "exit codes: 0 done; 2 bad config or arguments; 3 too many failed runs; "
-    "4 a declared requirement is not met; 1 a bug of ours"
+    "4 a declared requirement is not met; 1 a bug of ours; 130 stopped by Ctrl-C"
 )
 
 
@@ -30,7 +30,7 @@ def main(argv: Sequence[str] | None = None) -> int:
               file=sys.stderr)  # fmt: skip
         return 1
     except KeyboardInterrupt:
-        print("flexdoce: stopped; what was answered is stored, run the same command to continue", file=sys.stderr)
+        print("flexdoce: stopped; run the same command to continue, no answer that came in is lost", file=sys.stderr)
         return 130
 
 

@@ -83,7 +83,7 @@ class FitTable(Table):
     interactions: bool = Field(default=True, description="whether products of different factors are candidates")
     trim: bool = Field(default=True, description="whether terms that the data do not support are removed")
     runs_per_term: float = Field(
-        default=1.05, ge=1.0, le=100.0, description="runs per candidate term, where n_runs is not given"
+        default=1.5, ge=1.0, le=100.0, description="runs per candidate term, where n_runs is not given"
     )
 
 

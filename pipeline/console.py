@@ -23,7 +23,7 @@ _errors = Console(stderr=True, highlight=False)
 def progress_bars() -> Iterator[Told]:
     """One bar per stage on standard error; plain lines where that is no terminal."""
     if not _errors.is_terminal:
-        yield _lines
+        yield _lines()
         return
     columns = (SpinnerColumn(finished_text="✓"), TextColumn("{task.description:<12}"), BarColumn(bar_width=32),
                MofNCompleteColumn(), TimeElapsedColumn())  # fmt: skip
@@ -38,9 +38,17 @@ def progress_bars() -> Iterator[Told]:
         yield told
 
 
-def _lines(stage: str, done: int, total: int) -> None:
-    if total and done == total:
-        _errors.print(f"{stage}: {total} runs done" if total > 1 else f"{stage}: done")
+def _lines() -> Told:
+    """One line per finished stage, for a log; says how many runs were known from before."""
+    known: dict[str, int] = {}
+
+    def told(stage: str, done: int, total: int) -> None:
+        before = known.setdefault(stage, done)
+        if total and done == total:
+            already = f" ({before} known from before)" if before else ""
+            _errors.print(f"{stage}: {total} runs done{already}" if total > 1 else f"{stage}: done")
+
+    return told
 
 
 def design_table(design: Design, title: str, most: int = 40) -> None:
@@ -78,11 +86,15 @@ def summary(outcome: Outcome) -> None:
         )
     console.print(table)
     if outcome.screening.flagged_dummies:
-        console.print("Dummy columns carry more than noise: interactions or curvature act as well.", style="yellow")
+        console.print("Dummy columns carry more than noise: interactions of factors act as well.", style="yellow")
+    if outcome.screening.undecided:
+        names = ", ".join(outcome.screening.undecided)
+        console.print(f"Screening could not decide who acts on {names}: all factors are kept.", style="yellow")
     if model.certificate:
         console.print(f"Inverse: {model.certificate.verdict}; {model.certificate.reason}.")
     answered = len(trip.targets) - trip.n_refused
-    console.print(f"Round trip: {answered} of {len(trip.targets)} responses inverted and confirmed by the oracle.")
+    apart = f"; there the oracle is within {100 * trip.worst:.2g} % of the range of what was wanted"
+    console.print(f"Round trip: {answered} of {len(trip.targets)} responses inverted{apart if trip.errors else ''}.")
     seconds = np.sum(list(outcome.seconds.values()))
     console.print(f"Took {seconds:.1f} s.")
     places = {"Report": "report.html", "Model": "model.json"}

@@ -1,5 +1,6 @@
 """How a design is run: what is known is read back, the rest is answered batch by batch and stored at once."""
 
+from collections import Counter
 from typing import Protocol
 
 import numpy as np
@@ -34,7 +35,9 @@ def execute(oracle: Oracle, design: Design, store: PointStore, stage: str, progr
     # A design may hold the same settings twice; they are paid for once.
     first = {key: i for i, key in reversed(list(enumerate(keys)))}
     missing = np.array(sorted(i for key, i in first.items() if key not in answers), dtype=int)
-    progress(stage, len(points) - len(missing), len(points))
+    times = Counter(keys)
+    done = sum(times[key] for key in answers)
+    progress(stage, done, len(points))
     for start in range(0, len(missing), oracle.batch):
         rows = missing[start : start + oracle.batch]
         runs = oracle(design.take(rows))
@@ -44,7 +47,8 @@ def execute(oracle: Oracle, design: Design, store: PointStore, stage: str, progr
         answers.update(
             zip(batch_keys, zip(batch.values.tolist(), batch.status, batch.reasons, strict=True), strict=True)
         )
-        progress(stage, len(points) - len(missing) + start + len(rows), len(points))
+        done += sum(times[key] for key in batch_keys)
+        progress(stage, done, len(points))
     ordered = [answers[key] for key in keys]
     return Runs(
         design,

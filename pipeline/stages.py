@@ -28,10 +28,10 @@ class RoundTrip:
 
     Parameters
     ----------
-    inversion : Inversion
-        One row per target.
     targets : Runs
         Validation runs; their responses are the targets, so every one is known to be reachable.
+    inversion : Inversion
+        One row per target.
     answers : Runs
         The oracle at the settings found; refused targets are left out.
     errors : tuple of ResponseError
@@ -42,6 +42,11 @@ class RoundTrip:
     inversion: Inversion
     answers: Runs
     errors: tuple[ResponseError, ...]
+
+    @property
+    def worst(self) -> float:
+        """Largest error of the answers over the response's range, over all responses; NaN if there is no answer."""
+        return max((e.max_relative for e in self.errors), default=float("nan"))
 
     @property
     def n_refused(self) -> int:
@@ -57,12 +62,17 @@ def screened(study: Study, runs: Runs) -> Screening:
 
 
 def kept_factors(study: Study, screening: Screening) -> tuple[str, ...]:
-    """Factors worth filling: those that act on some response, and those the config keeps."""
+    """Factors worth filling: those that act on some response, and those the config keeps.
+
+    All of them, if some response moves but no single factor stands out: dropping one would be a guess.
+    """
+    if screening.undecided:
+        return study.space.names
     wanted = {*screening.active_factors, *study.config.screening.keep}
     if not wanted:
         raise InputError(
-            "screening found no factor that acts on any response: widen the ranges, or name the factors to "
-            "keep in screening.keep"
+            "no response moves when the factors do: widen the ranges, look at the oracle, or name the factors "
+            "to keep in screening.keep"
         )
     return tuple(n for n in study.space.names if n in wanted)
 
@@ -113,7 +123,7 @@ def widened(surrogate: Surrogate, study: Study, columns: list[int]) -> Surrogate
 def validated(study: Study, surrogate: Surrogate, runs: Runs) -> Surrogate:
     """The model with its errors on fresh runs."""
     tolerate(study, runs, "validation")
-    return replace(surrogate, validation=errors(surrogate, runs))
+    return replace(surrogate, validation=errors(surrogate, runs, study.oracle.resolution))
 
 
 def inversion_design(surrogate: Surrogate, runs: Runs) -> tuple[Runs, Inversion, Design]:
@@ -126,8 +136,8 @@ def inversion_design(surrogate: Surrogate, runs: Runs) -> tuple[Runs, Inversion,
 def round_trip(study: Study, targets: Runs, inversion: Inversion, answers: Runs) -> RoundTrip:
     """How far the oracle, run at the inverted settings, is from the targets."""
     tolerate(study, answers, "inversion")
-    wanted = targets.values[inversion.ok][answers.ok]
-    found = compare(answers.responses, wanted, answers.completed().values) if answers.ok.any() else ()
+    wanted, given = targets.values[inversion.ok][answers.ok], answers.completed().values
+    found = compare(answers.responses, wanted, given, study.oracle.resolution) if len(given) else ()
     return RoundTrip(targets, inversion, answers, found)
 
 
@@ -149,7 +159,8 @@ def shortfalls(study: Study, surrogate: Surrogate) -> list[str]:
             if not error.max_relative <= require.max_relative_error:
                 found.append(
                     f"{error.response}: maximum relative error {error.max_relative:.3g} exceeds "
-                    f"require.max_relative_error = {require.max_relative_error:g}"
+                    f"require.max_relative_error = {require.max_relative_error:g} (more runs in fit.design.n_runs, "
+                    "a higher fit.degree or narrower ranges may help)"
                 )
     certificate = surrogate.certificate
     if require.certified_inverse and (certificate is None or certificate.verdict is not Verdict.CERTIFIED):

@@ -91,7 +91,7 @@ def resolve(config: Config) -> Study:
 
 
 def _seed(config: Config, stage: str) -> np.random.SeedSequence:
-    return np.random.SeedSequence(config.seed, spawn_key=(STAGES.index(stage),))
+    return np.random.SeedSequence(config.seed, spawn_key=tuple(stage.encode()))
 
 
 def _space(config: Config, oracle: Oracle) -> FactorSpace:
@@ -106,6 +106,12 @@ def _check_fill(study: Study) -> None:
     """Refuse a filling design that cannot carry the candidate terms."""
     n_factors = len(study.space)
     method: Any = _checked("fit.design", lambda: study.fill_method(n_factors))
+    levels = getattr(method, "levels", None)
+    if levels is not None and levels <= study.config.fit.degree:
+        raise InputError(
+            f"fit.design: {levels} levels cannot show a degree of {study.config.fit.degree}; "
+            f"use levels = {study.config.fit.degree + 1} or more, or a lower fit.degree"
+        )
     needed, n_runs = len(study.candidates(n_factors)), method.n_runs
     if n_runs < needed:
         raise InputError(

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from .artefact import dumps, load, loads
 from .certificate import Certificate, Verdict, certify
-from .inversion import AffineInverse, Inversion, InversionStatus, affine_inverse
+from .inversion import AffineInverse, Inversion, InversionStatus, affine_inverse, affine_map
 from .model import Surrogate
 from .validation import ResponseError, errors
 
@@ -36,6 +36,7 @@ __all__ = [
     "Surrogate",
     "Verdict",
     "affine_inverse",
+    "affine_map",
     "certify",
     "dumps",
     "errors",

@@ -16,7 +16,7 @@ from experiments.settings import build
 from experiments.terms import Terms
 
 from .certificate import Certificate, Verdict
-from .inversion import affine_inverse
+from .inversion import affine_inverse, affine_map
 from .model import Surrogate
 from .validation import ResponseError
 
@@ -92,15 +92,14 @@ def load(path: str | Path) -> Surrogate:
 def _affine(model: Surrogate) -> dict[str, Any] | None:
     if not model.is_affine:
         return None
-    centre = model.factors.centre[None]
-    slope = model.jacobian(centre)[0]
+    matrix, offset = affine_map(model)
     inverse = affine_inverse(model)
     return {
         "form": "response = matrix · setting + offset; setting = inverse · response + inverse_offset",
         "rows": [r.label for r in model.responses],
         "columns": list(model.factors.labels),
-        "matrix": slope.tolist(),
-        "offset": (model.predict(centre)[0] - slope @ centre[0]).tolist(),
+        "matrix": matrix.tolist(),
+        "offset": offset.tolist(),
         "inverse": inverse.gain.tolist(),
         "inverse_offset": inverse.offset.tolist(),
         "condition": inverse.condition if math.isfinite(inverse.condition) else None,

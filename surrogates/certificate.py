@@ -76,7 +76,7 @@ def certify(model: "Surrogate") -> Certificate:
             None,
             tuple(float(v) for v in directions[-1]),
             "responses do not change along the witness direction, so many settings give one response; "
-            "the inverse returns the one nearest to the centre",
+            "the inverse returns one of them",
         )
     condition = float(singular[0] / singular[-1])
     return Certificate(

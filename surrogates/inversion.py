@@ -90,6 +90,21 @@ class AffineInverse:
     condition: float
 
 
+def affine_map(model: "Surrogate") -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Matrix (n_responses, n_factors) and offset (n_responses,) of an affine model, in physical units.
+
+    Raises
+    ------
+    ValueError
+        If the model has terms above degree one.
+    """
+    if not model.is_affine:
+        raise ValueError("only an affine model is a matrix and an offset; this one has terms above degree one")
+    centre = model.factors.centre[None]
+    matrix = model.jacobian(centre)[0]
+    return matrix, model.predict(centre)[0] - matrix @ centre[0]
+
+
 def affine_inverse(model: "Surrogate") -> AffineInverse:
     """The closed-form inverse of an affine model.
 

@@ -53,7 +53,8 @@ def penalised_fit(
     Parameters
     ----------
     matrix : ndarray, shape (n_runs, n_terms)
-        Model matrix; a column of ones is the constant.
+        Model matrix; its first column of ones is the constant. A further one (a square on two levels)
+        cannot be told from it and gets the coefficient zero.
     y : ndarray, shape (n_runs,)
     columns : ndarray of int
         Columns to use.
@@ -67,7 +68,7 @@ def penalised_fit(
     With the penalty fixed, the residual of run i when it is left out is e_i/(1 − h_ii) exactly, h
     being the diagonal of the smoother (Golub, Heath and Wahba 1979, Technometrics 21, 215–223).
     """
-    constant = [i for i, c in enumerate(columns) if (matrix[:, c] == 1.0).all()]
+    constant = [i for i, c in enumerate(columns) if c == constant_column(matrix)]
     sloped = np.delete(np.arange(len(columns)), constant)
     X = matrix[:, columns[sloped]]
     shift = X.mean(axis=0) if constant else np.zeros(X.shape[1])
@@ -121,13 +122,19 @@ def trimmed_fit(
     path = backward_path(matrix, y, penalties, floor)
     explained = [fit for fit in path if fit.loo_rmse <= floor]
     chosen = explained[-1] if explained else path[_supported_step(matrix, y, floor, path)]
-    sloped = np.array([c for c in chosen.columns if not (matrix[:, c] == 1.0).all()], dtype=np.int64)
-    if len(sloped) < len(chosen.columns):
+    sloped = chosen.columns[chosen.columns != constant_column(matrix)]
+    if len(sloped) < len(chosen.columns) and np.isfinite(chosen.loo).all():
         without = penalised_fit(matrix, y, sloped, penalties, floor)
         allowed = np.mean(chosen.loo**2) + _standard_error(chosen.loo)
         if np.mean(without.loo**2) <= max(float(allowed), floor**2):
             return without
     return chosen
+
+
+def constant_column(matrix: NDArray[np.float64]) -> int:
+    """Position of the first column of ones; −1 if there is none."""
+    ones = np.flatnonzero((matrix == 1.0).all(axis=0))
+    return int(ones[0]) if ones.size else -1
 
 
 def backward_path(
@@ -151,7 +158,8 @@ def _supported_step(matrix: NDArray[np.float64], y: NDArray[np.float64], floor: 
     errors = np.zeros((len(y), len(path)))
     for k in range(n_folds):
         out = fold == k
-        errors[out] = y[out, None] - _path_predictions(matrix[~out], y[~out], matrix[out], penalties)
+        predicted = _path_predictions(matrix[~out], y[~out], matrix[out], penalties, constant_column(matrix))
+        errors[out] = y[out, None] - predicted
     squares = np.mean(errors**2, axis=0)
     best = int(np.argmin(squares))
     allowed = max(squares[best] + _standard_error(errors[:, best]), floor**2)
@@ -159,15 +167,19 @@ def _supported_step(matrix: NDArray[np.float64], y: NDArray[np.float64], floor: 
 
 
 def _path_predictions(
-    matrix: NDArray[np.float64], y: NDArray[np.float64], asked: NDArray[np.float64], penalties: list[float]
+    matrix: NDArray[np.float64],
+    y: NDArray[np.float64],
+    asked: NDArray[np.float64],
+    penalties: list[float],
+    constant: int,
 ) -> NDArray[np.float64]:
     """Predictions at the rows `asked` by each model of a backward path with given penalties, (n_asked, n_steps).
 
     The same path as :func:`backward_path`, but on the normal equations, which is much cheaper where
     no leave-one-out error is needed.
     """
-    sloped = np.flatnonzero(~(matrix == 1.0).all(axis=0))
-    has_constant = len(sloped) < matrix.shape[1]
+    sloped = np.flatnonzero(np.arange(matrix.shape[1]) != constant)
+    has_constant = constant >= 0
     shift = matrix[:, sloped].mean(axis=0) if has_constant else np.zeros(len(sloped))
     level = y.mean() if has_constant else 0.0
     centred, asked = matrix[:, sloped] - shift, asked[:, sloped] - shift

@@ -45,8 +45,12 @@ class ResponseError:
     worst_run: int
 
 
-def compare(responses: tuple[Response, ...], truth: ArrayLike, predicted: ArrayLike) -> tuple[ResponseError, ...]:
+def compare(
+    responses: tuple[Response, ...], truth: ArrayLike, predicted: ArrayLike, resolution: float = 0.0
+) -> tuple[ResponseError, ...]:
     """Errors of `predicted` against `truth`, both (n_runs, n_responses) in SI, one entry per response.
+
+    A response whose range is below `resolution` times its largest absolute value does not move.
 
     Raises
     ------
@@ -64,14 +68,15 @@ def compare(responses: tuple[Response, ...], truth: ArrayLike, predicted: ArrayL
         worst = int(np.argmax(size[:, j]))
         spread = float(np.ptp(truth[:, j]))
         largest = float(size[worst, j])
-        measure = spread or float(np.abs(truth[:, j]).max())
+        size_of_truth = float(np.abs(truth[:, j]).max())
+        measure = spread if spread > resolution * size_of_truth else size_of_truth
         relative = largest / measure if measure > 0.0 else (0.0 if largest == 0.0 else np.inf)
         rmse = float(np.sqrt(np.mean(size[:, j] ** 2)))
         found.append(ResponseError(response.name, len(truth), largest, spread, float(relative), rmse, worst))
     return tuple(found)
 
 
-def errors(model: "Surrogate", runs: Runs) -> tuple[ResponseError, ...]:
+def errors(model: "Surrogate", runs: Runs, resolution: float = 0.0) -> tuple[ResponseError, ...]:
     """Errors of `model` on the runs that have an answer; `worst_run` counts rows of ``runs.completed()``."""
     done = runs.completed()
-    return compare(model.responses, done.values, model.predict(done.design.physical))
+    return compare(model.responses, done.values, model.predict(done.design.physical), resolution)

@@ -25,7 +25,7 @@ class Design:
         Name of the method that made it.
     dummies : array_like, shape (n_runs, n_dummies), optional
         Columns of an orthogonal two-level design that no factor was assigned to. Their contrasts
-        carry what the factors cannot explain: noise, interactions, curvature.
+        carry what the main effects cannot explain: noise and interactions.
 
     Raises
     ------

@@ -50,6 +50,14 @@ class PublishedMap:
     notes: Mapping[tuple[str, str], str]
     remarks: tuple[str, ...] = ()
 
+    def differences(self, ours: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far a map is from the published one, entry by entry, shape (n_responses, n_factors).
+
+        Relative to the published entry; where that is zero, to the largest of its row.
+        """
+        row = np.abs(self.values).max(axis=1, keepdims=True)
+        return (ours - self.values) / np.where(self.values != 0.0, self.values, np.where(row > 0.0, row, 1.0))
+
 
 @dataclass(frozen=True, eq=False)
 class Line:
@@ -88,8 +96,8 @@ class Oracle(ABC):
 
     Attributes
     ----------
-    name, summary, source : str
-        What it is called, what it answers, where the physics comes from.
+    name, summary, source, limits : str
+        What it is called, what it answers, where the physics comes from, what it leaves out.
     version : str
         Raised whenever the answers change.
     batch : int
@@ -101,6 +109,7 @@ class Oracle(ABC):
     name: ClassVar[str]
     summary: ClassVar[str] = ""
     source: ClassVar[str] = ""
+    limits: ClassVar[str] = ""
     version: ClassVar[str] = "1"
     batch: ClassVar[int] = 1
     resolution: ClassVar[float] = 0.0

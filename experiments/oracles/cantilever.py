@@ -34,6 +34,7 @@ class Cantilever(JaxOracle):
 
     name: ClassVar[str] = "cantilever"
     summary: ClassVar[str] = "tip-loaded leaf spring, small displacements, closed form"
+    limits: ClassVar[str] = "Small displacements, no shear"
     source: ClassVar[str] = "Roark's Formulas for Stress and Strain, 7th ed., Table 8.1, case 1a"
     resolution: ClassVar[float] = 1e-12
 

@@ -9,6 +9,9 @@ from ..runs import Runs
 from .contrasts import Effects, effects
 from .lenth import LenthResult, lenth
 
+MARGIN_OF_FLOOR = 10.0
+"""How many noise floors a contrast must exceed to be called a movement."""
+
 
 @dataclass(frozen=True, eq=False)
 class Screening:
@@ -45,8 +48,25 @@ class Screening:
         return tuple(n for n in self.lenth[names.index(response)].active_names if n in factors)
 
     @property
+    def undecided(self) -> tuple[str, ...]:
+        """Responses that move by more than their noise floor although no factor stands out.
+
+        Interactions as large as the main effects do that: they fill the dummy columns from which the
+        error is estimated. So do more active contrasts than Lenth's method can bear.
+        """
+        found = []
+        for response, result in zip(self.effects.responses, self.lenth, strict=True):
+            moves = np.abs(result.contrasts).max() > MARGIN_OF_FLOOR * result.noise_floor
+            if moves and not self.active_on(response.name):
+                found.append(response.name)
+        return tuple(found)
+
+    @property
     def flagged_dummies(self) -> dict[str, tuple[str, ...]]:
-        """Dummy columns beyond the margin of error, by response: interactions or curvature hide there."""
+        """Dummy columns beyond the margin of error, by response: interactions of factors show there.
+
+        Curvature does not: on two levels a square is constant.
+        """
         found = {}
         for response, result in zip(self.effects.responses, self.lenth, strict=True):
             flagged = result.active & self.effects.is_dummy

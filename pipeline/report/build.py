@@ -45,6 +45,7 @@ def _content(outcome: Outcome, provenance: Mapping[str, Any]) -> dict[str, Any]:
         "shortfalls": outcome.shortfalls,
         "requirements": config.require.model_dump(exclude_none=True),
         "activity": views.activity(outcome),
+        "undecided": outcome.screening.undecided,
         "flagged": outcome.screening.flagged_dummies,
         "screening_title": METHODS[config.screening.design.method].title,
         "screening_runs": len(outcome.screening_runs),

@@ -8,23 +8,25 @@ import numpy as np
 from experiments.designs import METHODS, level_discrepancy_squared
 from experiments.oracles import Shape
 from experiments.oracles.plots import exaggeration, size
-from surrogates import Verdict, affine_inverse
+from surrogates import Verdict, affine_inverse, affine_map
 
 from ..runner import Outcome
 
 
 def number(value: float, digits: int = 4) -> str:
-    """A number for people: significant digits, a true minus sign, powers of ten where they help."""
+    """A number for people: at least `digits` significant digits, a true minus sign, powers of ten where they help."""
     if not np.isfinite(value):
         return "–"
     if value == 0.0:
         return "0"
-    exponent = int(np.floor(np.log10(abs(value))))
+    mantissa, power = f"{value:.{digits - 1}e}".split("e")
+    mantissa = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
+    exponent = int(power)
     if -4 <= exponent < 7:
+        # Whole numbers keep all their digits: rounding 141402 to 141400 would look like a measured zero.
         text = f"{value:.{max(0, digits - 1 - exponent)}f}"
         text = text.rstrip("0").rstrip(".") if "." in text else text
     else:
-        mantissa, power = f"{value:.{max(0, digits - 2)}e}".split("e")
         text = f"{mantissa}·10{_superscript(int(power))}"
     return text.replace("-", "−")
 
@@ -44,7 +46,7 @@ def headline(outcome: Outcome) -> list[dict[str, str]]:
     verdict = str(certificate.verdict) if certificate else "none"
     if certificate and certificate.condition is not None:
         verdict += f", condition {number(certificate.condition, 3)}"
-    answered = len(trip.targets) - trip.n_refused
+    certified = verdict.startswith("certified")
     return [
         {
             "label": "model",
@@ -54,21 +56,25 @@ def headline(outcome: Outcome) -> list[dict[str, str]]:
         {
             "label": "largest error",
             "value": f"{percent(worst.max_relative)} of the range",
-            "note": f"on {worst.n_runs} fresh random runs, in {worst.response}",
+            "note": f"against the oracle on {worst.n_runs} fresh random runs, in {worst.response}",
         },
-        {"label": "inverse", "value": verdict, "note": "no two settings in the box give the same responses"
-         if verdict.startswith("certified") else "see “Inverse” below"},
+        {
+            "label": "inverse",
+            "value": verdict,
+            "note": "no two settings in the box give the same responses" if certified else "see “Inverse” below",
+        },
         {
             "label": "round trip",
-            "value": f"{answered} of {len(trip.targets)}",
-            "note": "wanted responses inverted and confirmed by the oracle",
+            "value": f"{len(trip.targets) - trip.n_refused} of {len(trip.targets)} inverted",
+            "note": f"there the oracle is within {percent(trip.worst)} of the range of what was wanted",
         },
-    ]  # fmt: skip
+    ]
 
 
 def factors(outcome: Outcome) -> list[dict[str, str]]:
     """One row per factor."""
     acting = set(outcome.screening.active_factors)
+    used = np.array(outcome.model.terms.exponents).reshape(-1, len(outcome.study.space)).any(axis=0)
     return [
         {
             "name": f.name,
@@ -77,21 +83,24 @@ def factors(outcome: Outcome) -> list[dict[str, str]]:
             "high": number(f.high, 6),
             "acts": "yes" if f.name in acting else "no",
             "kept": "yes" if f.name in outcome.kept else "no",
+            "used": "yes" if u else "no",
             "source": f.source,
         }
-        for f in outcome.study.space
+        for f, u in zip(outcome.study.space, np.atleast_1d(used), strict=True)
     ]
 
 
 def activity(outcome: Outcome) -> dict[str, Any]:
-    """Effects by contrast and response, with what is active."""
+    """Effects by contrast and response, with what is active; effects below the noise floor are shown as a dot."""
     screening = outcome.screening
     scale = np.array([r.shown_scale for r in outcome.model.responses])
+    floor = np.array([r.noise_floor for r in screening.lenth])
     rows = []
     for i, name in enumerate(screening.effects.names):
+        seen = np.abs(screening.effects.values[i]) > floor
         cells = [
-            {"text": number(v, 5) if a else "·", "active": bool(a)}
-            for v, a in zip(screening.effects.values[i] * scale, screening.active[i], strict=True)
+            {"text": number(v, 5) if s else "·", "active": bool(a)}
+            for v, s, a in zip(screening.effects.values[i] * scale, seen, screening.active[i], strict=True)
         ]
         rows.append({"name": name, "dummy": bool(screening.effects.is_dummy[i]), "cells": cells})
     margins = [
@@ -116,7 +125,7 @@ def fill(outcome: Outcome) -> dict[str, Any]:
         "n_runs": len(design),
         "n_factors": len(columns),
         "levels": max(levels) if few else None,
-        "cd2": f"{level_discrepancy_squared(settings):.6f}",
+        "cd2": f"{level_discrepancy_squared(settings):.6f}" if few else None,
     }
 
 
@@ -126,13 +135,11 @@ def linear_map(outcome: Outcome) -> dict[str, Any] | None:
     if not model.is_affine:
         return None
     scale = np.array([r.shown_scale for r in model.responses])
-    centre = model.factors.centre[None]
-    slope = model.jacobian(centre)[0] * scale[:, None]
+    matrix, offset = affine_map(model)
     inverse = affine_inverse(model)
-    offset = (model.predict(centre)[0] * scale) - slope @ centre[0]
     return {
-        "matrix": [[number(v, 6) for v in row] for row in slope],
-        "offset": [number(v, 6) for v in offset],
+        "matrix": [[number(v, 6) for v in row] for row in matrix * scale[:, None]],
+        "offset": [number(v, 6) for v in offset * scale],
         "has_offset": bool(np.any(offset != 0.0)),
         "inverse": [[number(v, 5) for v in row] for row in inverse.gain / scale],
         "condition": number(inverse.condition, 4),
@@ -155,48 +162,40 @@ def published(outcome: Outcome) -> dict[str, Any] | None:
     if known is None:
         return None
     shown = {r.name: r for r in model.responses}
-    slope = model.jacobian(model.factors.centre[None])[0]
-    names = [r.name for r in model.responses]
-    notes: list[str] = []
-    rows, worst, leak = [], 0.0, 0.0
+    rows_of = [[r.name for r in model.responses].index(name) for name in known.responses]
+    columns_of = [model.factors.index(name) for name in known.factors]
+    ours = model.jacobian(model.factors.centre[None])[0][np.ix_(rows_of, columns_of)]
+    differences = known.differences(ours)
+    zero = known.values == 0.0
+    notes = list(dict.fromkeys(known.notes.values()))
+    rows = []
     for i, response in enumerate(known.responses):
-        row_scale = float(np.abs(known.values[i]).max())
-        cells = []
+        scale, cells = shown[response].shown_scale, []
         for j, factor in enumerate(known.factors):
-            theirs = known.values[i, j]
-            ours = slope[names.index(response), model.factors.index(factor)]
-            note = known.notes.get((response, factor), "")
-            if note and note not in notes:
-                notes.append(note)
-            if theirs != 0.0:
-                worst = max(worst, abs(ours / theirs - 1.0))
-                difference = f"{number(100.0 * (ours / theirs - 1.0), 2)} %"
-            else:
-                leak = max(leak, abs(ours) / row_scale)
-                difference = "" if ours == 0.0 else f"{number(abs(ours) / row_scale, 2)} of row"
-            unit_scale = shown[response].shown_scale
+            apart = number(100.0 * differences[i, j], 2) + (" % of row" if zero[i, j] else " %")
+            note = known.notes.get((response, factor))
             cells.append(
                 {
-                    "theirs": number(theirs * unit_scale, 7),
-                    "ours": number(ours * unit_scale, 7),
-                    "difference": difference,
+                    "theirs": number(known.values[i, j] * scale, 7),
+                    "ours": number(ours[i, j] * scale, 7),
+                    "difference": "=" if ours[i, j] == known.values[i, j] else apart,
                     "mark": notes.index(note) + 1 if note else None,
                 }
             )
         rows.append({"response": shown[response], "cells": cells})
     return {
         "source": known.source,
-        "factors": known.factors,
+        "factors": [model.factors.factors[j].label for j in columns_of],
         "rows": rows,
         "notes": notes,
         "remarks": known.remarks,
-        "worst": percent(worst),
-        "leak": number(leak, 2),
+        "worst": percent(float(np.abs(differences[~zero]).max(initial=0.0))),
+        "leak": number(float(np.abs(differences[zero]).max(initial=0.0)), 2),
     }
 
 
 def error_rows(outcome: Outcome, errors: Any) -> list[dict[str, str]]:
-    """A table like the thesis's Table 2.5, in shown units."""
+    """One row per response, in shown units."""
     shown = {r.name: r for r in outcome.model.responses}
     return [
         {
@@ -226,7 +225,7 @@ def certificate(outcome: Outcome) -> dict[str, Any] | None:
 
 
 def shapes(outcome: Outcome) -> list[tuple[str, Shape]]:
-    """Cases to draw: a validation run first, as in the thesis, then each factor alone at its high end."""
+    """Cases to draw: a validation run first, then each factor alone at its high end."""
     oracle, space = outcome.study.oracle, outcome.study.space
     cases = [("first validation run", outcome.validation_runs.design.physical[0])]
     for i, factor in enumerate(space):

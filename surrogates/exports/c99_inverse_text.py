@@ -13,7 +13,8 @@ $slope
     return status;
 }
 
-int ${p}_inverse(const double responses[${P}_N_RESPONSES], double settings[${P}_N_FACTORS])
+/* As the inverse, but writes what it tried whatever the status. */
+static int ${p}_search(const double responses[${P}_N_RESPONSES], double settings[${P}_N_FACTORS])
 {
 $moves    for (int i = 0; i < ${P}_N_RESPONSES; ++i) {
         if (!isfinite(responses[i])) {
@@ -22,6 +23,19 @@ $moves    for (int i = 0; i < ${P}_N_RESPONSES; ++i) {
     }
 $inverse
     return ${p}_check(responses, settings);
+}
+
+int ${p}_inverse(const double responses[${P}_N_RESPONSES], double settings[${P}_N_FACTORS])
+{
+    double found[${P}_N_FACTORS] = {0.0};
+    const int status = ${p}_search(responses, found);
+
+    if (status == ${P}_OK) {
+        for (int j = 0; j < ${P}_N_FACTORS; ++j) {
+            settings[j] = found[j];
+        }
+    }
+    return status;
 }
 """
 
@@ -102,7 +116,8 @@ static void ${p}_least_norm(double slope[${P}_N_RESPONSES][${P}_N_FACTORS],
     }
 }
 
-int ${p}_inverse(const double responses[${P}_N_RESPONSES], double settings[${P}_N_FACTORS])
+/* As the inverse, but writes what it tried whatever the status. */
+static int ${p}_search(const double responses[${P}_N_RESPONSES], double settings[${P}_N_FACTORS])
 {
     static const double scale[${P}_N_RESPONSES] = {$scale};
     double coded[${P}_N_FACTORS] = {0.0};
@@ -142,5 +157,18 @@ int ${p}_inverse(const double responses[${P}_N_RESPONSES], double settings[${P}_
 $decoding
     status = ${p}_check(responses, settings);
     return status == ${P}_OK || converged ? status : ${P}_NOT_CONVERGED;
+}
+
+int ${p}_inverse(const double responses[${P}_N_RESPONSES], double settings[${P}_N_FACTORS])
+{
+    double found[${P}_N_FACTORS] = {0.0};
+    const int status = ${p}_search(responses, found);
+
+    if (status == ${P}_OK) {
+        for (int j = 0; j < ${P}_N_FACTORS; ++j) {
+            settings[j] = found[j];
+        }
+    }
+    return status;
 }
 """

@@ -61,7 +61,7 @@ int ${p}_jacobian(const double settings[${P}_N_FACTORS],
  * Settings that give the responses.
 $inverse_note
  * OK means that the settings lie in the domain and that the model gives each response there to $accuracy
- * of the most it can change. With any other status the settings show what was tried: do not apply them.
+ * of the most it can change. With any other status the settings are left as they were.
  */
 int ${p}_inverse(const double responses[${P}_N_RESPONSES], double settings[${P}_N_FACTORS]);
 

@@ -276,7 +276,7 @@ class TestExitCodes:
         config.write_text(config_text(), encoding="utf-8")
         assert main(["run", str(config), "--out", str(out)]) == 130
         err = capsys.readouterr().err
-        assert err.splitlines()[-1].startswith("flexdoce: stopped; what was answered is stored")
+        assert err.splitlines()[-1].startswith("flexdoce: stopped; run the same command to continue")
         assert stored(out) == sorted(set(counted.asked))
 
     def test_1_only_for_a_bug_of_ours(self):
@@ -361,7 +361,7 @@ class TestCheckPlanList:
         monkeypatch.chdir(tmp_path)
         Path("study.toml").write_text(config_text(), encoding="utf-8")
         out, _ = answered("plan", "study.toml", *SET_SMALL)
-        for words in ("12 runs, plackett_burman", "18 runs, uniform", "15 candidate terms", "20 random runs"):
+        for words in ("12 runs, plackett_burman", "24 runs, uniform", "15 candidate terms", "20 random runs"):
             assert words in " ".join(out.split())
         for label in ("a[N]", "b[mm]", "c[rad]", "d[1]"):
             assert label in out

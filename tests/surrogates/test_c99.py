@@ -190,24 +190,24 @@ def test_huge_targets_are_refused(pair):
 
 
 @needs_compiler
-def test_affine_inverse_outside_shows_the_settings_it_would_take(tmp_path):
+def test_affine_inverse_outside_writes_nothing(tmp_path):
     model = hexflex_like()
     compiled = Compiled(tmp_path, model)
     wanted = model.factors.decode(np.array([[1.2, 0, 0, 0, 0, 0]]))
     status, settings = compiled.inverse(model.predict(wanted)[0])
     assert status == OUTSIDE_DOMAIN
-    assert np.abs((settings - wanted[0]) / model.factors.half_range).max() <= 1e-12
+    assert (settings == 777.0).all()
 
 
 @needs_compiler
-def test_iterative_inverse_outside_shows_the_settings_it_would_take(tmp_path):
+def test_iterative_inverse_outside_writes_nothing(tmp_path):
     model = square_quadratic()
     compiled = Compiled(tmp_path, model)
     wanted = model.factors.decode(np.array([[1.1, -0.3, 0.5], [0.2, -1.05, 0.9]]))
-    for target, expected in zip(model.predict(wanted), wanted, strict=True):
+    for target in model.predict(wanted):
         status, settings = compiled.inverse(target)
         assert status == OUTSIDE_DOMAIN
-        assert np.abs((settings - expected) / model.factors.half_range).max() <= 1e-12
+        assert (settings == 777.0).all()
 
 
 @needs_compiler
@@ -332,7 +332,7 @@ def test_provenance_order_does_not_matter():
 
 def test_zeros_are_left_out():
     files = get("c99").render(AFFINE["block_map"](), "dev")
-    inverse = files["dev.c"].partition("int dev_inverse")[2]
+    inverse = files["dev.c"].partition("int dev_search")[2]
     row = inverse.partition("settings[0] = ")[2].partition(";")[0]
     assert "d_r0" in row
     assert "d_r1" in row
