@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from experiments import Factor, FactorSpace, Response, Runs, Status, Terms, model_matrix
 from experiments.designs import Design, LatinHypercube, PlackettBurman
+from experiments.oracles import PointOracle
 from experiments.screening import effects, lenth, screen
 from tests.reference import hexflex_map, hexflex_table, lenth_case
 
@@ -228,3 +229,28 @@ class TestPublishedHexFlex:
         ours = 0.5 * found.values[:6].T
         assert np.abs(ours - entries)[[0, 1, 2, 3, 5]].max() <= 0.051
         assert_allclose(ours[4], [0, -26.9, 0, -34032.7, 0, 34059.7], atol=0.06)
+
+
+class Product(PointOracle):
+    """A product of powers over wide ranges: interactions as large as the main effects fill the dummies."""
+
+    name = "product"
+    resolution = 1e-12
+
+    @property
+    def factors(self):
+        return FactorSpace(tuple(Factor(n, "1", 0.0, 3.0) for n in "abcd"))
+
+    @property
+    def responses(self):
+        return (Response("y", "1"), Response("still", "1"))
+
+    def respond(self, point):
+        return [point.prod() ** 3, 7.0]
+
+
+def test_a_response_that_moves_while_no_factor_stands_out_is_undecided():
+    oracle = Product()
+    screening = screen(oracle(PlackettBurman(12).generate(oracle.factors)), resolution=oracle.resolution)
+    assert screening.active_on("y") == ()
+    assert screening.undecided == ("y",)

@@ -203,3 +203,15 @@ def test_the_scale_of_the_response_does_not_matter():
     first, second = trimmed_fit(matrix, y, floor=1e-12), trimmed_fit(matrix, 1e-9 * y, floor=1e-21)
     assert_array_equal(first.columns, second.columns)
     assert_allclose(1e-9 * first.coefficients, second.coefficients, rtol=1e-9)
+
+
+def test_a_square_on_two_levels_does_not_double_the_constant():
+    # Every square is a second column of ones there, which nothing can tell from the constant.
+    space = unit_box(2)
+    corners = np.array([[a, b] for a in (-1.0, 1.0) for b in (-1.0, 1.0)] * 3)
+    y = 5.0 + 2.0 * corners[:, 0]
+    terms = Terms.polynomial(space.names, 2)
+    matrix = model_matrix(terms, corners)
+    for fit in (trimmed_fit(matrix, y, floor=1e-12), penalised_fit(matrix, y, np.arange(len(terms)))):
+        np.testing.assert_allclose(matrix[:, fit.columns] @ fit.coefficients, y, rtol=0.0, atol=1e-12)
+    assert [terms.labels[c] for c in trimmed_fit(matrix, y, floor=1e-12).columns] == ["1", "f0"]
