@@ -165,12 +165,14 @@ def invert(model: "Surrogate", targets: ArrayLike) -> Inversion:
     coded = np.clip(coded, -1.0, 1.0)
     nearest = model.predict_coded(coded)
     settings = model.factors.decode(coded)
+    with np.errstate(over="ignore"):
+        distance = _distance(nearest / model.scale, targets / model.scale)
     return Inversion(
         np.where(ok[:, None], settings, np.nan),
         tuple(InversionStatus.OK if k else InversionStatus.OUTSIDE for k in ok),
         settings,
         nearest,
-        _distance(nearest / model.scale, targets / model.scale),
+        distance,
     )
 
 
@@ -186,7 +188,8 @@ def _brought_near(model: "Surrogate", targets: NDArray[np.float64]) -> NDArray[n
     Sums of squares of a target at 1e300 would overflow.
     """
     constant, _ = _affine_part(model)
-    offset = targets / model.scale - constant / model.scale
+    with np.errstate(over="ignore"):
+        offset = np.clip((targets - constant) / model.scale, -1e300, 1e300)
     farthest = np.abs(offset).max(axis=1, keepdims=True)
     far = farthest[:, 0] > FAR
     moved = constant + np.divide(offset, farthest, where=farthest > 0.0, out=np.zeros_like(offset)) * FAR * model.scale
@@ -195,7 +198,7 @@ def _brought_near(model: "Surrogate", targets: NDArray[np.float64]) -> NDArray[n
 
 def _distance(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     """Euclidean distance of rows, without overflow on the way."""
-    apart = np.abs(a - b)
+    apart = np.minimum(np.abs(a - b), np.finfo(float).max)
     largest = apart.max(axis=1)
     unit = apart / np.where(largest > 0.0, largest, 1.0)[:, None]
     return largest * np.sqrt((unit**2).sum(axis=1))
@@ -203,7 +206,8 @@ def _distance(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.floa
 
 def _reached(model: "Surrogate", coded: NDArray[np.float64], targets: NDArray[np.float64]) -> NDArray[np.bool_]:
     inside = (np.abs(coded) <= 1.0 + BOX_TOLERANCE).all(axis=1)
-    miss = np.abs(model.predict_coded(coded) - targets) / model.scale
+    with np.errstate(over="ignore"):
+        miss = np.abs(model.predict_coded(coded) - targets) / model.scale
     return np.logical_and(inside, (miss <= TARGET_TOLERANCE).all(axis=1))
 
 

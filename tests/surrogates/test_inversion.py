@@ -233,3 +233,13 @@ def test_targets_that_are_not_finite_are_an_error(build, bad):
 def test_targets_of_the_wrong_shape_are_an_error(targets):
     with pytest.raises(ValueError, match=r"targets must have shape \(n, 3\), one column per response \(r0, r1, r2\)"):
         more_responses().invert(targets)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", ["hexflex_like", "square_quadratic"])
+def test_a_target_at_the_end_of_float64_is_refused_quietly(name):
+    model = ALL[name]()
+    answer = model.invert(np.full((1, len(model.responses)), 1e308))
+    assert answer.status == (InversionStatus.OUTSIDE,)
+    assert np.isfinite(answer.nearest).all()
+    assert model.contains(answer.nearest_settings).all()
