@@ -10,7 +10,7 @@ from pathlib import Path
 from experiments.designs import Design, Random
 from experiments.runs import Runs
 from experiments.screening import Screening
-from surrogates import Surrogate, dumps, exports, loads
+from surrogates import RoundTrip, Surrogate, dumps, exports, loads
 
 from . import stages, tables
 from .config import load_config
@@ -18,7 +18,6 @@ from .errors import FlexdoceError, InputError
 from .executors import Progress, execute, silent
 from .provenance import provenance_json, read_provenance
 from .reading import Table, read_runs
-from .stages import RoundTrip
 from .store import RunFolder
 from .study import STAGES, Study, resolve
 
@@ -144,7 +143,7 @@ class _Runner:
         targets, inversion, design = stages.inversion_design(model, validation_runs)
         table = tables.inversion_csv(targets.values, inversion, model.factors, model.responses)
         self.folder.write("inversion/targets.csv", table)
-        trip = stages.round_trip(self.study, targets, inversion, self._executed("inversion", design))
+        trip = stages.confirmed(self.study, targets, inversion, self._executed("inversion", design))
         if trip.errors:
             self.folder.write("inversion/errors.csv", tables.errors_csv(trip.errors, model.responses))
         return trip
@@ -184,7 +183,7 @@ def read_run(path: str | Path) -> Outcome:
         targets, inversion, design = stages.inversion_design(model, runs["validation"])
         if len(design) != len(runs["inversion"]):
             raise ValueError("its inversion does not belong to its validation")
-        trip = stages.round_trip(study, targets, inversion, runs["inversion"])
+        trip = stages.confirmed(study, targets, inversion, runs["inversion"])
         kept = stages.kept_factors(study, screening)
     except (ValueError, FlexdoceError) as error:
         raise InputError(f"the run folder {folder.path} is damaged: {error}; run the study again") from None

@@ -1,17 +1,14 @@
 """The stages: pure functions from one noun to the next. Nothing here touches the disk or runs an oracle."""
 
 import hashlib
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
-
-import numpy as np
 
 import surrogates
 from experiments.designs import Design, Random
 from experiments.runs import Runs
 from experiments.screening import Screening, screen
-from surrogates import Inversion, ResponseError, Surrogate, Verdict, certify, errors
-from surrogates.validation import compare
+from surrogates import Inversion, RoundTrip, Surrogate, Verdict, certify, errors, round_trip
 
 from .config import dump_config
 from .errors import InputError, TooManyFailures
@@ -20,38 +17,6 @@ from .version import __version__
 
 INVERSE = "inverse"
 """Method of the design that an inversion makes."""
-
-
-@dataclass(frozen=True, eq=False)
-class RoundTrip:
-    """Wanted responses, inverted, and what the oracle answered at the settings found.
-
-    Parameters
-    ----------
-    targets : Runs
-        Validation runs; their responses are the targets, so every one is known to be reachable.
-    inversion : Inversion
-        One row per target.
-    answers : Runs
-        The oracle at the settings found; refused targets are left out.
-    errors : tuple of ResponseError
-        Answers against targets.
-    """
-
-    targets: Runs
-    inversion: Inversion
-    answers: Runs
-    errors: tuple[ResponseError, ...]
-
-    @property
-    def worst(self) -> float:
-        """Largest error of the answers over the response's range, over all responses; NaN if there is no answer."""
-        return max((e.max_relative for e in self.errors), default=float("nan"))
-
-    @property
-    def n_refused(self) -> int:
-        """Targets that the model would not invert."""
-        return int((~self.inversion.ok).sum())
 
 
 def screened(study: Study, runs: Runs) -> Screening:
@@ -107,17 +72,8 @@ def fitted(study: Study, kept: tuple[str, ...], runs: Runs) -> Surrogate:
         space=inner,
         responses=study.oracle.responses,
     ).fit(done.design.physical[:, columns], done.values)
-    surrogate = widened(regressor.surrogate_, study, columns)
+    surrogate = regressor.surrogate_.embed(study.space)
     return replace(surrogate, certificate=certify(surrogate), provenance=provenance(study, kept))
-
-
-def widened(surrogate: Surrogate, study: Study, columns: list[int]) -> Surrogate:
-    """The same polynomial as a model of all the study's factors, those not used with exponent zero."""
-    terms = surrogate.terms
-    exponents = np.zeros((len(terms), len(study.space)), dtype=int)
-    exponents[:, columns] = np.reshape(terms.exponents, (len(terms), len(columns)))
-    wide = replace(terms, names=study.space.names, exponents=tuple(map(tuple, exponents.tolist())))
-    return replace(surrogate, factors=study.space, terms=wide)
 
 
 def validated(study: Study, surrogate: Surrogate, runs: Runs) -> Surrogate:
@@ -133,12 +89,10 @@ def inversion_design(surrogate: Surrogate, runs: Runs) -> tuple[Runs, Inversion,
     return targets, inversion, Design.from_physical(surrogate.factors, inversion.settings[inversion.ok], INVERSE)
 
 
-def round_trip(study: Study, targets: Runs, inversion: Inversion, answers: Runs) -> RoundTrip:
-    """How far the oracle, run at the inverted settings, is from the targets."""
+def confirmed(study: Study, targets: Runs, inversion: Inversion, answers: Runs) -> RoundTrip:
+    """The round trip, if enough of it was answered."""
     tolerate(study, answers, "inversion")
-    wanted, given = targets.values[inversion.ok][answers.ok], answers.completed().values
-    found = compare(answers.responses, wanted, given, study.oracle.resolution) if len(given) else ()
-    return RoundTrip(targets, inversion, answers, found)
+    return round_trip(targets, inversion, answers, study.oracle.resolution)
 
 
 def tolerate(study: Study, runs: Runs, stage: str) -> None:

@@ -104,7 +104,7 @@ class RunFolder:
         return PointStore(self.path / POINTS, oracle)
 
     def _empty(self) -> None:
-        """Remove what we write and nothing else; the config is written over, if it differs."""
+        """Remove our files and our folders; the config is written over, if it differs."""
         for name in OURS:
             target = self.path / name
             if target.is_dir() and not target.is_symlink():

@@ -7,6 +7,7 @@
 :mod:`.inversion`      from wanted responses to settings, or a refusal
 :mod:`.certificate`    what may be claimed of the inverse
 :mod:`.validation`     errors against fresh runs
+:mod:`.round_trip`     wanted responses through the inverse and back through the oracle
 :mod:`.artefact`       ``model.json``, read and written
 :mod:`.exports`        code generated from the artefact alone
 =====================  ================================================================
@@ -21,6 +22,7 @@ from .artefact import dumps, load, loads
 from .certificate import Certificate, Verdict, certify
 from .inversion import AffineInverse, Inversion, InversionStatus, affine_inverse, affine_map
 from .model import Surrogate
+from .round_trip import RoundTrip, round_trip
 from .validation import ResponseError, errors
 
 if TYPE_CHECKING:
@@ -33,6 +35,7 @@ __all__ = [
     "InversionStatus",
     "PolynomialRegressor",
     "ResponseError",
+    "RoundTrip",
     "Surrogate",
     "Verdict",
     "affine_inverse",
@@ -42,6 +45,7 @@ __all__ = [
     "errors",
     "load",
     "loads",
+    "round_trip",
 ]
 
 

@@ -98,8 +98,7 @@ def affine_map(model: "Surrogate") -> tuple[NDArray[np.float64], NDArray[np.floa
     ValueError
         If the model has terms above degree one.
     """
-    if not model.is_affine:
-        raise ValueError("only an affine model is a matrix and an offset; this one has terms above degree one")
+    _check_affine(model)
     centre = model.factors.centre[None]
     matrix = model.jacobian(centre)[0]
     return matrix, model.predict(centre)[0] - matrix @ centre[0]
@@ -113,8 +112,7 @@ def affine_inverse(model: "Surrogate") -> AffineInverse:
     ValueError
         If the model has terms above degree one.
     """
-    if not model.is_affine:
-        raise ValueError("only an affine model has a closed-form inverse; this one has terms above degree one")
+    _check_affine(model)
     centre, half = model.factors.centre, model.factors.half_range
     constant, slope = _affine_part(model)
     scaled = slope / model.scale[:, None]
@@ -174,6 +172,13 @@ def invert(model: "Surrogate", targets: ArrayLike) -> Inversion:
         nearest,
         distance,
     )
+
+
+def _check_affine(model: "Surrogate") -> None:
+    if not model.is_affine:
+        raise ValueError(
+            "only an affine model has a closed-form inverse and a constant matrix; this one has terms above degree one"
+        )
 
 
 def _affine_part(model: "Surrogate") -> tuple[NDArray[np.float64], NDArray[np.float64]]:

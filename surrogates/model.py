@@ -1,7 +1,7 @@
 """The frozen surrogate: polynomials in coded factors that predict, differentiate and invert."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -92,6 +92,24 @@ class Surrogate:
     def contains(self, X: ArrayLike) -> NDArray[np.bool_]:
         """Which settings lie in the domain, shape (n,)."""
         return self.factors.contains(X)
+
+    def embed(self, space: FactorSpace) -> "Surrogate":
+        """The same polynomial as a model of all factors of a larger `space`; those it adds have no terms.
+
+        Raises
+        ------
+        ValueError
+            If `space` lacks one of the factors, or has it in another unit or range: coded units would differ.
+        """
+        columns = [space.index(name) for name in self.factors.names]
+        for factor, j in zip(self.factors, columns, strict=True):
+            there = space.factors[j]
+            if (there.unit, there.low, there.high) != (factor.unit, factor.low, factor.high):
+                raise ValueError(f"factor {factor.name!r} has another unit or range in the larger space")
+        exponents = np.zeros((len(self.terms), len(space)), dtype=int)
+        exponents[:, columns] = np.reshape(self.terms.exponents, (len(self.terms), len(columns)))
+        terms = Terms(space.names, tuple(map(tuple, exponents.tolist())))
+        return replace(self, factors=space, terms=terms)
 
     def predict_coded(self, coded: ArrayLike) -> NDArray[np.float64]:
         """As :meth:`predict`, from coded settings."""

@@ -14,7 +14,7 @@ from experiments.settings import parameter
 from ..inversion import BOX_TOLERANCE, MAX_ITERATIONS, TARGET_TOLERANCE, affine_inverse
 from . import c99_text as text
 from .base import about, check_prefix, number, plain
-from .c99_inverse_text import AFFINE, POLYNOMIAL
+from .c99_inverse_text import AFFINE, INVERSE, POLYNOMIAL
 
 if TYPE_CHECKING:
     from ..model import Surrogate
@@ -63,7 +63,7 @@ class C99:
         body = _affine(model) if model.is_affine else _polynomial(model)
         settings = {"steps": str(self.max_iterations), "still": number(STILL)}
         settings["rank"] = str(min(len(model.factors), len(model.responses)))
-        parts = AFFINE if model.is_affine else POLYNOMIAL
+        parts = (AFFINE if model.is_affine else POLYNOMIAL) + INVERSE
         source = Template(text.SOURCE + parts).substitute(names, **_common(model), **body, **settings)
         return {f"{prefix}.h": _header(model, names, settings), f"{prefix}.c": source}
 

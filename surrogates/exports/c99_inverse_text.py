@@ -1,4 +1,4 @@
-"""The fixed text of the C99 export that depends on the kind of model: Jacobian and inverse."""
+"""The fixed text of the C99 export's Jacobian and search for each kind of model, and the inverse that ends both."""
 
 AFFINE = """
 int ${p}_jacobian(const double settings[${P}_N_FACTORS],
@@ -23,19 +23,6 @@ $moves    for (int i = 0; i < ${P}_N_RESPONSES; ++i) {
     }
 $inverse
     return ${p}_check(responses, settings);
-}
-
-int ${p}_inverse(const double responses[${P}_N_RESPONSES], double settings[${P}_N_FACTORS])
-{
-    double found[${P}_N_FACTORS] = {0.0};
-    const int status = ${p}_search(responses, found);
-
-    if (status == ${P}_OK) {
-        for (int j = 0; j < ${P}_N_FACTORS; ++j) {
-            settings[j] = found[j];
-        }
-    }
-    return status;
 }
 """
 
@@ -158,7 +145,9 @@ $decoding
     status = ${p}_check(responses, settings);
     return status == ${P}_OK || converged ? status : ${P}_NOT_CONVERGED;
 }
+"""
 
+INVERSE = """
 int ${p}_inverse(const double responses[${P}_N_RESPONSES], double settings[${P}_N_FACTORS])
 {
     double found[${P}_N_FACTORS] = {0.0};

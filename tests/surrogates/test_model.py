@@ -1,14 +1,14 @@
 """The frozen surrogate: predict, Jacobian, scale, and what it refuses."""
 
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from experiments import FactorSpace, Response, Terms
+from experiments import Factor, FactorSpace, Response, Terms
 from surrogates import Surrogate
-from tests.surrogates.cases import ALL, box, constant, points, surrogate, unit_box
+from tests.surrogates.cases import ALL, box, constant, points, square_quadratic, surrogate, unit_box
 
 
 def model_with(coefficients, terms=("1", "a"), names=("a", "b")) -> Surrogate:
@@ -125,3 +125,20 @@ def test_refuses_points_of_the_wrong_shape(X):
         with pytest.raises(ValueError, match=r"must have shape \(n, 2\), one column per factor \(a, b\)"):
             method(X)
     assert isinstance(model.factors, FactorSpace)
+
+
+def test_embedding_adds_factors_that_do_nothing():
+    model = square_quadratic()
+    space = FactorSpace((Factor("z", "K", 0.0, 9.0), *reversed(model.factors.factors)))
+    wide = model.embed(space)
+    settings = points(model, 20, seed=3)
+    widened = np.column_stack([np.linspace(0.0, 9.0, 20), settings[:, ::-1]])
+    assert_allclose(wide.predict(widened), model.predict(settings), rtol=1e-14)
+    assert (wide.jacobian(widened)[:, :, 0] == 0.0).all()
+
+
+def test_embedding_refuses_another_range():
+    model = square_quadratic()
+    first, *others = model.factors
+    with pytest.raises(ValueError, match="factor 'a' has another unit or range in the larger space"):
+        model.embed(FactorSpace((replace(first, high=2.5), *others)))
