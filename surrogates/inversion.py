@@ -18,6 +18,9 @@ TARGET_TOLERANCE = 1e-9
 
 MAX_ITERATIONS = 50
 
+FITTED_ROUNDING = 64
+"""Relative rounding error of a fitted coefficient, in units of eps."""
+
 FAR = 1e6
 """Targets farther from the centre than this many scales are searched for at this distance."""
 
@@ -122,8 +125,10 @@ def affine_inverse(model: "Surrogate") -> AffineInverse:
     lost = singular[-1] <= rounding * singular[0]
     condition = np.inf if lost else float(singular[0] / singular[-1])
     if not lost:
-        # An entry within the inverse's own error is a structural zero: a controller need not multiply by it.
-        inverse[np.abs(inverse) <= rounding * condition * np.abs(inverse).max()] = 0.0
+        # Fitted coefficients carry rounding errors of some tens of eps; an entry of the inverse that is no larger
+        # than what they make of it is a structural zero, and a controller need not multiply by it.
+        carried = FITTED_ROUNDING * np.finfo(float).eps * condition
+        inverse[np.abs(inverse) <= carried * np.abs(inverse).max()] = 0.0
     gain = half[:, None] * inverse / model.scale
     return AffineInverse(gain, centre - gain @ constant, condition)
 
