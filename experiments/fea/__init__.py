@@ -32,7 +32,7 @@ All is computed in float64; the global setting ``jax_enable_x64`` is neither nee
 """
 
 from .linear import LinearSolver, Solution, factorise, load_array
-from .model import Frame, Load, Material, Member, RigidBody
+from .model import Frame, Load, Material, Member, Motion, RigidBody, Support
 from .results import Centreline, centrelines
 from .sections import Section, circle, rectangle
 
@@ -43,9 +43,11 @@ __all__ = [
     "Load",
     "Material",
     "Member",
+    "Motion",
     "RigidBody",
     "Section",
     "Solution",
+    "Support",
     "centrelines",
     "circle",
     "factorise",

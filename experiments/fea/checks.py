@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..naming import suggestion
+from .shapes import arc_normal, shapes
 
 if TYPE_CHECKING:
     from .model import Frame, Member
@@ -49,6 +50,9 @@ def _check_names(frame: "Frame") -> None:
                 raise ValueError(f"{kind} name {name!r} must be a text that is not empty")
         _refuse_repeated(names, f"two {plural} are called {{!r}}: give each its own name")
     _refuse_repeated(frame.clamps, "node {!r} is clamped twice: name it once")
+    _refuse_repeated(
+        (*frame.clamps, *(s.node for s in frame.supports)), "node {!r} is held twice: give it one clamp or support"
+    )
 
 
 def _refuse_repeated(names: Sequence[str], sentence: str) -> None:
@@ -68,6 +72,7 @@ def _check_references(frame: "Frame") -> None:
     for body in frame.bodies:
         check(f"rigid body {body.name!r}", body.all_nodes)
     check("a clamp", frame.clamps)
+    check("a support", (s.node for s in frame.supports))
 
 
 def _check_member(frame: "Frame", member: "Member") -> None:
@@ -78,8 +83,15 @@ def _check_member(frame: "Frame", member: "Member") -> None:
             f"member {member.name!r} has zero length: move node {member.start!r} or {member.end!r}, "
             "or join them in a rigid body"
         )
+    if member.through is not None and np.linalg.norm(arc_normal(start, member.through, end)) <= PARALLEL * length**2:
+        raise ValueError(
+            f"member {member.name!r}: through = {member.through} lies on the line of its ends; give a point off it, "
+            "or leave it out for a straight member"
+        )
     if member.up is not None:
-        normal = np.cross(np.subtract(end, start) / length, member.up)
+        middle = np.add(start, end) / 2 if member.through is None else np.array(member.through)
+        tangent = shapes(np, np.array(start), np.array(end), middle, np.ones(3)).axes[0]
+        normal = np.cross(tangent, member.up)
         if np.linalg.norm(normal) <= PARALLEL * math.hypot(*member.up):
             raise ValueError(
                 f"member {member.name!r}: up = {member.up} is parallel to the member or zero; give a vector across it"
@@ -96,11 +108,11 @@ def _check_bodies(frame: "Frame") -> None:
                     "make them one body or take the node out of one"
                 )
             owner[node] = body.name
-        clamped = [n for n in body.all_nodes if n in frame.clamps]
-        if len(clamped) > 1:
+        held = [n for n in body.all_nodes if n in frame.clamps or n in {s.node for s in frame.supports}]
+        if len(held) > 1:
             raise ValueError(
-                f"rigid body {body.name!r} is clamped at nodes {clamped[0]!r} and {clamped[1]!r}: "
-                "one clamp holds the whole body, so keep one"
+                f"rigid body {body.name!r} is clamped at nodes {held[0]!r} and {held[1]!r}: "
+                "one clamp or support holds the body, so keep one"
             )
     for member in frame.members:
         body = owner.get(member.start)

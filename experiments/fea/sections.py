@@ -31,6 +31,10 @@ class Section:
         J in torque = G J × twist per length, m⁴.
     shear_area_y, shear_area_z : float
         Area × shear coefficient for shear along y and z, m²; ``math.inf`` gives the Euler–Bernoulli beam.
+    extreme_y, extreme_z : float
+        From the centroid to the outermost fibres along y and z, m; NaN where unknown, and then the stress is.
+    is_round : bool
+        Bending stresses about y and z add as vectors, as on a circle, not as on the corner of a rectangle.
 
     Raises
     ------
@@ -44,10 +48,15 @@ class Section:
     torsion_constant: float
     shear_area_y: float = math.inf
     shear_area_z: float = math.inf
+    extreme_y: float = math.nan
+    extreme_z: float = math.nan
+    is_round: bool = False
 
     def __post_init__(self) -> None:
-        for field in fields(self):
+        for field in fields(self)[:-1]:
             value = getattr(self, field.name)
+            if field.name.startswith("extreme") and math.isnan(value):
+                continue
             if not value > 0 or (math.isinf(value) and not field.name.startswith("shear")):
                 raise ValueError(f"{field.name} of a section must be positive and finite, got {value}")
 
@@ -77,7 +86,8 @@ def rectangle(width: float, thickness: float, shear_coefficient: float = 5 / 6) 
     _check_positive("thickness", thickness)
     if not shear_coefficient > 0:
         raise ValueError(f"shear_coefficient must be positive, got {shear_coefficient}")
-    return Section(*map(float, rectangle_properties(width, thickness, shear_coefficient)))
+    numbers = map(float, rectangle_properties(width, thickness, shear_coefficient))
+    return Section(*numbers, extreme_y=width / 2, extreme_z=thickness / 2)
 
 
 def circle(diameter: float, shear_coefficient: float = 9 / 10) -> Section:
@@ -101,7 +111,10 @@ def circle(diameter: float, shear_coefficient: float = 9 / 10) -> Section:
         raise ValueError(f"shear_coefficient must be positive, got {shear_coefficient}")
     area, second_moment = math.pi * diameter**2 / 4, math.pi * diameter**4 / 64
     shear_area = shear_coefficient * area
-    return Section(area, second_moment, second_moment, 2 * second_moment, shear_area, shear_area)
+    radius = diameter / 2
+    return Section(
+        area, second_moment, second_moment, 2 * second_moment, shear_area, shear_area, radius, radius, is_round=True
+    )
 
 
 def rectangle_properties(

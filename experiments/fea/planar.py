@@ -1,0 +1,145 @@
+"""Motions in the xy-plane: a pose is (x, y, θ), a motion (δx, δy, δθ), a wrench (Fx, Fy, Mz).
+
+The batch lies in the last axes of every array.
+"""
+
+from typing import ClassVar
+
+import jax.numpy as jnp
+from jax import Array
+
+from .blocks import apply
+from .rods import Along, Components, Rods, even_series, integrate
+
+
+class Planar:
+    """The plane as the nonlinear solver sees it; :class:`.spatial.Spatial` has the same methods."""
+
+    size: ClassVar[int] = 3
+    n_pose: ClassVar[int] = 3
+    n_dead: ClassVar[int] = 5
+    motions: ClassVar[tuple[int, ...]] = (0, 1, 5)
+    """Which of the six motions of a node these are."""
+
+    # --- along a member -------------------------------------------------------------------------
+
+    def rates(self, internal: Components, strain: Components) -> Components:
+        """N' = N × κ and M' = N × γ."""
+        n1, n2, _ = internal
+        g1, g2, k = strain
+        return n2 * k, -n1 * k, n1 * g2 - n2 * g1
+
+    def bracket(self, first: Components, second: Components) -> Components:
+        """Commutator of two strains."""
+        a1, a2, k = first
+        b1, b2, m = second
+        return m * a2 - k * b2, k * b1 - m * a1, jnp.zeros_like(k)
+
+    def screwed(self, pose: Components, screw: Components) -> Components:
+        """The pose (x, y, θ, cos θ, sin θ) after a screw in its own axes."""
+        x, y, angle, c, s = pose
+        u, v, turn = screw
+        square = turn * turn
+        sine, versine = even_series(square, 1), even_series(square, 2) * turn / 2
+        ahead, aside = sine * u - versine * v, versine * u + sine * v
+        c_turn, s_turn = 1 - versine * turn, sine * turn
+        return (
+            x + c * ahead - s * aside,
+            y + s * ahead + c * aside,
+            angle + turn,
+            c * c_turn - s * s_turn,
+            s * c_turn + c * s_turn,
+        )
+
+    def law(self, wrench: Array, rods: Rods, n_steps: int) -> Array:
+        """Pose of the end body in the axes of the start body, under the wrench (3, ...) about its origin."""
+        return self._along(wrench, rods, n_steps, trace=False)[0]
+
+    def along(self, wrench: Array, rods: Rods, n_steps: int) -> Along:
+        """What is met along the members."""
+        start, met = self._along(wrench, rods, n_steps, trace=True)[1:]
+        (internal, pose), (there, poses) = start, met
+        return Along(
+            jnp.stack([jnp.concatenate([a[None], b]) for a, b in zip(internal, there, strict=True)]),
+            jnp.stack([jnp.concatenate([a[None], b]) for a, b in zip(pose, poses, strict=True)][:3]),
+        )
+
+    def _along(self, wrench: Array, rods: Rods, n_steps: int, trace: bool) -> tuple:
+        fx, fy, m = wrench
+        x, y, angle = (part + jnp.zeros_like(fx) for part in rods.start)
+        c, s = jnp.cos(angle), jnp.sin(angle)
+        internal = (c * fx + s * fy, c * fy - s * fx, m - x * fy + y * fx)
+        pose = (x, y, angle, c, s)
+        end, met = integrate(self, internal, pose, rods, n_steps, trace)
+        x, y, angle, c, s = end
+        dx, dy, turn = rods.end
+        return jnp.stack([x + c * dx - s * dy, y + s * dx + c * dy, angle + turn]), (internal, pose), met
+
+    # --- poses ----------------------------------------------------------------------------------
+
+    def spin(self, pose: Array, change: Array) -> Array:
+        """Motion (δx, δy, δθ) that belongs to a `change` of the numbers of a pose."""
+        return change
+
+    def turn(self, pose: Array) -> Array:
+        """Matrix that takes motions and wrenches from the axes of a body to the global ones, (3, 3, ...)."""
+        c, s = jnp.cos(pose[2]), jnp.sin(pose[2])
+        o, e = jnp.zeros_like(c), jnp.ones_like(c)
+        return jnp.stack([jnp.stack([c, -s, o]), jnp.stack([s, c, o]), jnp.stack([o, o, e])])
+
+    def gap(self, start: Array, end: Array, law: Array) -> Array:
+        """Motion, in the axes of the start, from where a member's law puts its end body to where that is."""
+        c, s = jnp.cos(start[2]), jnp.sin(start[2])
+        dx, dy = end[0] - start[0], end[1] - start[1]
+        return jnp.stack([c * dx + s * dy - law[0], c * dy - s * dx - law[1], end[2] - start[2] - law[2]])
+
+    def moved(self, pose: Array, motion: Array) -> Array:
+        """The pose after a motion in global axes."""
+        return pose + motion
+
+    def towards(self, goal: Array, pose: Array) -> Array:
+        """Motion in global axes from `pose` to `goal`."""
+        return goal - pose
+
+    def goal(self, motion: Array) -> Array:
+        """Pose of a body that was moved from its place at rest, the origin, by translation and rotation (3, ...)."""
+        return motion
+
+    # --- matrices of a member, in global axes -----------------------------------------------------
+
+    def shift(self, start: Array, end: Array) -> Array:
+        """Motion of the point at `end` when the start moves, (3, 3, ...)."""
+        x, y = end[:2] - start[:2]
+        o, e = jnp.zeros_like(x), jnp.ones_like(x)
+        return jnp.stack([jnp.stack([e, o, -y]), jnp.stack([o, e, x]), jnp.stack([o, o, e])])
+
+    def swing(self, wrench: Array) -> Array:
+        """Minus the change of a wrench per rotation of the body that carries it, (3, 3, ...)."""
+        fx, fy, _ = wrench
+        o = jnp.zeros_like(fx)
+        return jnp.stack([jnp.stack([o, o, fy]), jnp.stack([o, o, -fx]), jnp.stack([o, o, o])])
+
+    def lever(self, wrench: Array) -> Array:
+        """Moment n × δx of the force n when its point moves, as a matrix on motions, (3, 3, ...)."""
+        fx, fy, _ = wrench
+        o = jnp.zeros_like(fx)
+        return jnp.stack([jnp.stack([o, o, o]), jnp.stack([o, o, o]), jnp.stack([-fy, fx, o])])
+
+    # --- loads ----------------------------------------------------------------------------------
+
+    def dead(self, pose: Array, load: Array) -> tuple[Array, Array]:
+        """Wrench about a body's origin of loads of constant direction, and minus its tangent.
+
+        `load` is (Fx, Fy, Mz, Σ d × f, Σ d · f), with d from the origin to the loaded point at rest.
+        """
+        fx, fy, m, crossed, dotted = load
+        c, s = jnp.cos(pose[2]), jnp.sin(pose[2])
+        o = jnp.zeros_like(c + m)
+        stiffness = s * crossed + c * dotted
+        rows = [jnp.stack([o, o, o]), jnp.stack([o, o, o]), jnp.stack([o, o, stiffness + o])]
+        return jnp.stack([fx + o, fy + o, m + c * crossed - s * dotted]), jnp.stack(rows)
+
+    def follower(self, pose: Array, load: Array) -> tuple[Array, Array]:
+        """Wrench (3, ...) of loads that turn with the body, and minus its tangent."""
+        wrench = apply(self.turn(pose), load)
+        return wrench, self.swing(wrench)
