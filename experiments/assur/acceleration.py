@@ -40,7 +40,8 @@ class Anderson:
         steps, changes = np.stack(self._steps, axis=1), np.stack(self._changes, axis=1)
         gram = changes @ changes.transpose(0, 2, 1)
         ridge = RIDGE * np.einsum("nkk->n", gram) / len(self._steps) + np.finfo(float).tiny
-        share = solve_each(gram + ridge[:, None, None] * np.eye(len(self._steps)), (changes @ residual[..., None])[..., 0])
+        gram += ridge[:, None, None] * np.eye(len(self._steps))
+        share = solve_each(gram, (changes @ residual[..., None])[..., 0])
         return plain - (share[:, None] @ (steps + self._relaxation * changes))[:, 0]
 
     def keep(self, rows: np.ndarray) -> None:

@@ -54,7 +54,8 @@ def _refuse_repeated(names: Sequence[str], sentence: str) -> None:
 def _check_module(mechanism: "Mechanism", module: "Module", earlier: Iterable[str]) -> None:
     """Each free link hangs on one flexure, and the links inside are joined as the module says."""
     kind, links = type(module).__name__, module.links
-    hub, arms = (links[:1], links[1:]) if len(links) > 1 else ((), links)
+    hub = links[: len(links) > 1]  # the platform of a triad, the first link of a dyad
+    arms = links[len(hub) :]
     inner = mechanism.flexures_between(arms, hub)
     free = arms if len(links) == 4 else links  # the platform of a triad hangs on its legs alone
     for link in free:
@@ -67,7 +68,7 @@ def _check_module(mechanism: "Mechanism", module: "Module", earlier: Iterable[st
     for arm in arms if hub else ():
         found = [f.name for f in mechanism.flexures_between([arm], hub)]
         if len(found) != 1:
-            raise ValueError(f"the {kind} of {hub[0]!r} needs one flexure from it to {arm!r}, got {found}")
+            raise ValueError(f"the {kind} of {links[0]!r} needs one flexure from it to {arm!r}, got {found}")
     touching = mechanism.flexures_between(links, [*earlier, *links])
     wanted = {f.name for f in (*inner, *mechanism.flexures_between(free, earlier))}
     for flexure in touching:
@@ -91,10 +92,10 @@ def _check_shape(mechanism: "Mechanism", module: "Module", earlier: Iterable[str
     if not np.abs(along).all():
         raise ValueError(f"an arm of the {type(module).__name__} {links} has no length between its equivalent joints")
     along /= np.abs(along)
-    rows = [along.real, along.imag]
+    rows = [np.real(along), np.imag(along)]
     if hub:
         lever = np.subtract(inner, centre)
-        rows.append((lever.conj() * along).imag / np.abs(lever).max())
+        rows.append(np.imag(np.conj(lever) * along) / np.abs(lever).max())
     if abs(np.linalg.det(rows)) < STRAIGHT:
         how = "lie on lines through one point or parallel" if hub else "are in line"
         raise ValueError(f"the arms of the {type(module).__name__} {links} {how} at rest: change its geometry")

@@ -33,18 +33,22 @@ class Rule(NamedTuple):
     nodes, weights : numpy.ndarray, shape (p,)
     integrals : numpy.ndarray, shape (p, p)
         Row i integrates the interpolating polynomial from 0 to node i.
+    tail : numpy.ndarray, shape (2, p)
+        The last two Legendre coefficients of the interpolating polynomial, over p².
     """
 
     nodes: np.ndarray
     weights: np.ndarray
     integrals: np.ndarray
+    tail: np.ndarray
 
 
 @lru_cache
 def gauss(p: int) -> Rule:
     """The rule with `p` nodes, from Legendre polynomials."""
     x, w = np.polynomial.legendre.leggauss(p)
-    return Rule((1 + x) / 2, w / 2, integrals_to(x, p))
+    coefficients = np.linalg.inv(np.polynomial.legendre.legvander(x, p - 1))
+    return Rule((1 + x) / 2, w / 2, integrals_to(x, p), coefficients[-2:] / p**2)
 
 
 def integrals_to(stations: np.ndarray, p: int) -> np.ndarray:
@@ -71,6 +75,8 @@ class Deflection:
         θ at the Gauss nodes, rad.
     solved : numpy.ndarray of bool
         Whether Newton's iteration closed.
+    tail : numpy.ndarray
+        Share in θ of the two highest polynomials, rad. Tip and moment are off by about its square.
     """
 
     tip: np.ndarray
@@ -78,6 +84,7 @@ class Deflection:
     root_moment: np.ndarray
     angles: np.ndarray
     solved: np.ndarray
+    tail: np.ndarray
 
 
 def deflect(
@@ -124,6 +131,7 @@ def deflect(
         root_moment=root.reshape(shape) * bending / length,
         angles=angles.reshape(*shape, nodes),
         solved=solved.reshape(shape),
+        tail=np.abs(f @ rule.tail.T).sum(axis=1).reshape(shape),
     )
 
 
@@ -139,7 +147,7 @@ def _newton(angles, turn, pull, stretch, rule: Rule) -> np.ndarray:
 
     With κ(0) eliminated, θ = Θ s + G f(θ), where G is Green's function of θ'' = f between fixed ends.
     """
-    nodes, weights, integrals = rule
+    nodes, weights, integrals, _ = rule
     green = integrals @ integrals - np.outer(nodes, weights * (1 - nodes))
     solved = np.zeros(len(turn), bool)
     todo = np.flatnonzero(np.isfinite(turn) & np.isfinite(pull))
@@ -159,7 +167,14 @@ def _newton(angles, turn, pull, stretch, rule: Rule) -> np.ndarray:
     return solved
 
 
-def moments_along(deflection: Deflection, force, length, bending, axial=np.inf, stations: int = 33) -> np.ndarray:
+def moments_along(
+    deflection: Deflection,
+    force: np.ndarray,
+    length: np.ndarray,
+    bending: np.ndarray,
+    axial: np.ndarray | float = np.inf,
+    stations: int = 33,
+) -> np.ndarray:
     """Bending moment at equidistant stations from clamp to tip, shape (..., stations), N m."""
     p = deflection.angles.shape[-1]
     shape = deflection.moment.shape
@@ -167,4 +182,5 @@ def moments_along(deflection: Deflection, force, length, bending, axial=np.inf, 
     stretch = np.broadcast_to(bending / (axial * length**2), shape).reshape(-1)
     f, _, _ = _curving(deflection.angles.reshape(-1, p), pull, stretch)
     inside = f @ integrals_to(np.linspace(-1, 1, stations), p).T
-    return deflection.root_moment[..., None] + inside.reshape(*shape, stations) * np.asarray(bending / length)[..., None]
+    scale = np.broadcast_to(bending / length, shape)[..., None]
+    return deflection.root_moment[..., None] + inside.reshape(*shape, stations) * scale

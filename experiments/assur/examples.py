@@ -2,6 +2,7 @@
 
 import cmath
 import math
+from itertools import pairwise
 
 from .checks import finite_point
 from .groups import GROUND, DrivingLink, Dyad, Mechanism, Triad
@@ -68,13 +69,17 @@ def flexure_3rrr(
     flexures, rest = [], cmath.phase(along)
     for k, names in enumerate(("EHK", "FIL", "GJM")):
         links = (GROUND, f"crank{k + 1}", f"coupler{k + 1}", "platform")
-        ends = ((corner, flexure * along), (knee - flexure * along, flexure * along), (top - flexure * toward, flexure * toward))
+        ends = (
+            (corner, flexure * along),
+            (knee - flexure * along, flexure * along),
+            (top - flexure * toward, flexure * toward),
+        )
         turn = cmath.rect(1, 2 * math.pi * k / 3)
         for name, first, second, (start, leap) in zip(names, links, links[1:], ends, strict=False):
             flexures.append(Flexure(name, first, second, _point(start * turn), _point((start + leap) * turn), leaf))
     angles = [math.remainder(rest + 2 * math.pi * k / 3, 2 * math.pi) for k in range(3)]
     drivers = [DrivingLink(f"crank{k + 1}", angle) for k, angle in enumerate(angles)]
-    return Mechanism(flexures, (*drivers, Triad("platform", ("coupler1", "coupler2", "coupler3"))))
+    return Mechanism(tuple(flexures), (*drivers, Triad("platform", ("coupler1", "coupler2", "coupler3"))))
 
 
 def flexure_four_bar(
@@ -102,7 +107,7 @@ def flexure_four_bar(
     """
     named = {"crank_base": crank_base, "crank_tip": crank_tip, "rocker_tip": rocker_tip, "rocker_base": rocker_base}
     points = [complex(*finite_point(name, value)) for name, value in named.items()]
-    spans = [b - a for a, b in zip(points, points[1:], strict=False)]
+    spans = [b - a for a, b in pairwise(points)]
     if not all(abs(span) > length for span in spans):
         raise ValueError(f"neighbouring middles must be further apart than the flexure length {length} m")
     links = (GROUND, "crank", "coupler", "rocker", GROUND)
@@ -110,7 +115,7 @@ def flexure_four_bar(
     for k, (name, point, span) in enumerate(zip("ABCD", points, (spans[0], spans[1], spans[1], spans[2]), strict=True)):
         half = span / abs(span) * length / 2
         flexures.append(Flexure(name, links[k], links[k + 1], _point(point - half), _point(point + half), leaf))
-    return Mechanism(flexures, (DrivingLink("crank"), Dyad("coupler", "rocker")))
+    return Mechanism(tuple(flexures), (DrivingLink("crank"), Dyad("coupler", "rocker")))
 
 
 def _point(place: complex) -> Point:

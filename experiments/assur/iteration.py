@@ -17,6 +17,7 @@ from .layout import Layout
 from .statics import Wrench, modular_statics
 
 CLOSED = 1e-9  # gap over the shortest leaf above which a module does not close
+RESOLVED = 1e-3  # rad; share of the highest polynomials in a leaf's angle above which it needs more nodes
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,9 @@ class Settings:
         Share of each step that is taken, in (0, 1].
     max_iterations : int
         Passes after which a point is given up.
+    retries : tuple of int
+        A point that fails is tried again with angles and loads raised in so many increments, then in so
+        many; empty for one attempt alone.
     torque_tolerance : float
         Largest change of a driving torque between the last two passes, N m; the thesis's 1e-6 N mm.
     tolerance : float
@@ -51,6 +55,7 @@ class Settings:
     memory: int = 5
     relaxation: float = 1.0
     max_iterations: int = 100
+    retries: tuple[int, ...] = (4, 16, 64)
     torque_tolerance: float = 1e-9
     tolerance: float = 1e-9
 
@@ -59,6 +64,9 @@ class Settings:
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int) or value < least:
                 raise ValueError(f"{name} must be a whole number of at least {least}, got {value!r}")
+        object.__setattr__(self, "retries", tuple(self.retries))
+        if not all(isinstance(k, int) and k > 1 for k in self.retries):
+            raise ValueError(f"retries must be whole numbers above 1, got {self.retries}")
         if not 0 < self.relaxation <= 1:
             raise ValueError(f"relaxation must lie above 0 and at most at 1, got {self.relaxation}")
         for name in ("torque_tolerance", "tolerance"):
@@ -151,7 +159,7 @@ def iterate(
         residual, change = _largest(step), _largest(now.torques - torques)
         settled = (residual < settings.tolerance) & (change < settings.torque_tolerance)
         over = settled | ~np.isfinite(residual) | (iteration == settings.max_iterations)
-        found = Outcome(now, np.full(len(rows), iteration), residual, change, settled & _sound(lay, now))
+        found = Outcome(now, np.full(len(rows), iteration), residual, change, settled & sound(lay, now))
         outcome = outcome or pick(found, np.arange(n))
         store(outcome, found, rows, over)
         left, rows = ~over, rows[~over]
@@ -166,14 +174,35 @@ def iterate(
 def iterate_in_steps(
     lay: Layout, angles: np.ndarray, loads: Sequence[Wrench], settings: Settings, increments: int
 ) -> Outcome:
-    """Raise angles and loads together in equal increments, each solved from the one before."""
-    outcome, total = None, np.zeros(len(angles), int)
-    for share in np.arange(1, increments + 1) / increments:
-        raised = [(link, share * force, point, share * moment) for link, force, point, moment in loads]
-        outcome = iterate(lay, share * angles, raised, settings, outcome)
-        total += outcome.iterations
-    assert outcome is not None  # increments are at least 1
-    return replace(outcome, iterations=total)
+    """Raise angles and loads together in equal increments, each solved from the one before.
+
+    A point that fails on the way has failed: what it found later could belong to another branch.
+    """
+    raised = [(link, force / increments, point, moment / increments) for link, force, point, moment in loads]
+    outcome = iterate(lay, angles / increments, raised, settings)
+    for count in range(2, increments + 1):
+        rows, share = np.flatnonzero(outcome.converged), count / increments
+        if not len(rows):
+            break
+        raised = [(link, share * force[rows], point, share * moment[rows]) for link, force, point, moment in loads]
+        now = iterate(lay, share * angles[rows], raised, settings, pick(outcome, rows))
+        now = replace(now, iterations=outcome.iterations[rows] + now.iterations)
+        store(outcome, now, rows, np.ones(len(rows), bool))
+    return outcome
+
+
+def iterate_stubbornly(lay: Layout, angles: np.ndarray, loads: Sequence[Wrench], settings: Settings) -> Outcome:
+    """In one go; points that fail again in the increments of ``settings.retries``, one count after the other."""
+    outcome = iterate(lay, angles, loads, settings)
+    for increments in settings.retries:
+        rows = np.flatnonzero(~outcome.converged)
+        if not len(rows):
+            break
+        again = iterate_in_steps(lay, angles[rows], _rows_of(loads, rows), settings, increments)
+        again = replace(again, iterations=outcome.iterations[rows] + again.iterations)
+        store(outcome, again, rows, again.converged | (increments == settings.retries[-1]))
+        outcome.iterations[rows] = again.iterations
+    return outcome
 
 
 def _state(lay: Layout, deflection: Deflection) -> np.ndarray:
@@ -187,10 +216,11 @@ def _largest(change: np.ndarray) -> np.ndarray:
     return np.abs(change).max(axis=1, initial=0)
 
 
-def _sound(lay: Layout, now: Pass) -> np.ndarray:
-    """Points whose modules close in their assembly modes and whose leaves are all solved."""
-    closed = (now.poses.gap < CLOSED * lay.length.min()).all(axis=1)
-    return closed & now.poses.kept.all(axis=1) & now.deflection.solved.all(axis=1)
+def sound(lay: Layout, now: Pass) -> np.ndarray:
+    """Points whose modules close in their assembly modes and whose leaves are all solved and resolved."""
+    closed = (now.poses.gap < CLOSED * lay.length.min()) & now.poses.kept
+    found = now.deflection.solved & (now.deflection.tail < RESOLVED)
+    return closed.all(axis=1) & found.all(axis=1)
 
 
 def _rows_of(loads: Sequence[Wrench], rows: np.ndarray) -> list[Wrench]:

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .groups import Dyad, Mechanism, Triad
-from .model import Load
+from .groups import Dyad, Mechanism, Module, Triad
+from .model import Flexure, Load
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,14 +96,13 @@ def layout(mechanism: Mechanism) -> Layout:
     )
 
 
-def _group(mechanism: Mechanism, module, earlier: Sequence[str], joint: np.ndarray) -> Group:
+def _group(mechanism: Mechanism, module: Module, earlier: Sequence[str], joint: np.ndarray) -> Group:
     hub = module.links[:1] if isinstance(module, Triad) else ()
     arms = module.links[len(hub) :]
     outer = _indices(mechanism, mechanism.flexures_between(arms, earlier))
     if isinstance(module, Triad):
         inner = _indices(mechanism, mechanism.flexures_between(arms, hub))
-        kind, mode = "triad", 1.0
-        mode = np.sign(np.linalg.det(lines(joint[list(inner)], joint[list(outer)])))
+        kind, mode = "triad", np.sign(np.linalg.det(lines(joint[list(inner)], joint[list(outer)])))
     elif isinstance(module, Dyad):
         inner = _indices(mechanism, mechanism.flexures_between(arms[:1], arms[1:]))
         first, second = joint[list(outer)]
@@ -113,7 +112,7 @@ def _group(mechanism: Mechanism, module, earlier: Sequence[str], joint: np.ndarr
     return Group(kind, tuple(mechanism.links.index(link) for link in (*arms, *hub)), outer, inner, float(mode))
 
 
-def _indices(mechanism: Mechanism, flexures) -> tuple[int, ...]:
+def _indices(mechanism: Mechanism, flexures: Sequence[Flexure]) -> tuple[int, ...]:
     return tuple(mechanism.flexures.index(f) for f in flexures)
 
 
@@ -124,10 +123,12 @@ def lines(points: np.ndarray, others: np.ndarray) -> np.ndarray:
     """
     arm = points - others
     lever = points - points.mean(axis=-1, keepdims=True)
-    return np.stack([arm.real, arm.imag, (lever.conj() * arm).imag], axis=-1)
+    return np.stack([np.real(arm), np.imag(arm), np.imag(np.conj(lever) * arm)], axis=-1)
 
 
-def wrenches(mechanism: Mechanism, loads: Sequence[Load], n_points: int) -> list[tuple[int, np.ndarray, complex, np.ndarray]]:
+def wrenches(
+    mechanism: Mechanism, loads: Sequence[Load], n_points: int
+) -> list[tuple[int, np.ndarray, complex, np.ndarray]]:
     """Loads as (link, force, point, moment); force (n_points,) complex, moment (n_points,)."""
     found = []
     for load in loads:

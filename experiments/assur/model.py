@@ -42,7 +42,7 @@ class Leaf:
         for field in fields(self):
             value = getattr(self, field.name)
             if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"{field.name} of a leaf must be positive and finite, got {value}: give it in SI units")
+                raise ValueError(f"{field.name} of a leaf must be positive and finite in SI units, got {value}")
 
     @property
     def bending_stiffness(self) -> float:

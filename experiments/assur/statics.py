@@ -59,7 +59,7 @@ def modular_statics(
 
 def cross(arm: np.ndarray, force: np.ndarray) -> np.ndarray:
     """Moment of a force, both as complex numbers."""
-    return (np.conj(arm) * force).imag
+    return np.imag(np.conj(arm) * force)
 
 
 def _external(poses: Poses, loads: Sequence[Wrench]) -> tuple[np.ndarray, np.ndarray]:
