@@ -77,7 +77,7 @@ def tip_displacements(points: Vector, stiffness: Stiffness, loads: ArrayLike, n_
         tip, _ = builder.chain(_clamped(builder, points[0]), points[1:], *_element(stiffness))
         ops.pattern("Plain", 1, 1)
         ops.load(tip, *force, 0.0, 0.0, 0.0)
-        static_analysis(n_steps, 1e-9 * np.ptp(points))
+        static_analysis(n_steps, 1e-9 * np.ptp(points), 200, algorithm="NewtonLineSearch")
         advance(n_steps)
         answers.append(ops.nodeDisp(tip)[:3])
     ops.wipe()

@@ -51,7 +51,7 @@ class HexFlex:
     def limb(self, mirror: float, turn: float) -> Vector:
         """Root, bend and clamp of a limb, m, shape (3, 3)."""
         root = np.array([self.root_offset, self.root_radius])
-        bend = root + [self.length_1, 0.0]
+        bend = root + np.array([self.length_1, 0.0])
         clamp = bend + self.length_2 * np.array([np.cos(self.bend_angle), np.sin(self.bend_angle)])
         return turned(np.array([root, bend, clamp]) * [mirror, 1.0], turn)
 
@@ -72,6 +72,7 @@ def solve(
     mechanism: HexFlex | None = None,
     rigidity: float = RIGIDITY,
     rebuild: bool = False,
+    tolerance: float = 1e-9,
 ) -> Vector:
     """Pose of the platform's centroid under dead loads at the tabs.
 
@@ -88,6 +89,8 @@ def solve(
         Stiffness of the platform's beams over that of the limbs.
     rebuild : bool
         Build the model anew for every point instead of resetting it.
+    tolerance : float
+        On Newton's last correction, m and rad mixed; the error left is a few times that.
 
     Returns
     -------
@@ -104,7 +107,7 @@ def solve(
             ops.reset()
             ops.remove("loadPattern", 1)
         load(model, point)
-        static_analysis(n_steps)
+        static_analysis(n_steps, tolerance)
         advance(n_steps)
         poses[i] = _pose(model)
     ops.wipe()
@@ -136,9 +139,9 @@ def build(m: HexFlex, n_elements: int, transformation: str, rigidity: float = RI
     return Model(centre, tabs, tabs_at_rest)
 
 
-def load(model: Model, forces: Vector) -> None:
-    """Apply the six dead loads, N, as load pattern 1."""
-    ops.pattern("Plain", 1, 1)
+def load(model: Model, forces: Vector, pattern: int = 1, series: int = 1) -> None:
+    """Apply the six dead loads, N, as a load pattern."""
+    ops.pattern("Plain", pattern, series)
     for tab, angle, (d1, d2) in zip(model.tabs, IN_PLANE, forces.reshape(3, 2), strict=True):
         ops.load(tab, float(d1 * np.cos(angle)), float(d1 * np.sin(angle)), float(d2), 0.0, 0.0, 0.0)
 

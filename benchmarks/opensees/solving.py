@@ -8,17 +8,21 @@ import openseespy.opensees as ops
 from numpy.typing import NDArray
 
 
-def static_analysis(n_steps: int, tolerance: float = 1e-9, iterations: int = 30, system: str = "BandGeneral") -> None:
-    """Full Newton, `n_steps` equal increments of the load factor to 1; `tolerance` bounds the last increment.
+def static_analysis(
+    n_steps: int, tolerance: float = 1e-9, iterations: int = 50, system: str = "BandGeneral", algorithm: str = "Newton"
+) -> None:
+    """Newton's method, `n_steps` equal increments of the load factor to 1; `tolerance` bounds the last correction.
 
-    The tolerance is on the Euclidean norm of all displacement increments, m and rad mixed.
+    The tolerance is on the Euclidean norm of all displacement corrections, m and rad mixed. The tangent of the
+    spatial corotational transformation is not exact: convergence is linear, so the error left is a few tolerances,
+    and large rotations need ``NewtonLineSearch``.
     """
     ops.wipeAnalysis()
     ops.constraints("Transformation")
     ops.numberer("RCM")
     ops.system(system)
     ops.test("NormDispIncr", tolerance, iterations, 0, 2)
-    ops.algorithm("Newton")
+    ops.algorithm(algorithm)
     ops.integrator("LoadControl", 1.0 / n_steps)
     ops.analysis("Static", "-noWarnings")
 
