@@ -1,23 +1,36 @@
 """The stiffness of a frame and the kinematics of its rigid bodies.
 
-Pure functions of coordinates and properties, differentiable in both; topology comes as whole numbers.
-The shapes are those of :class:`.arrays.FrameArrays`.
+Pure functions of shapes, coordinates and properties, differentiable in all; topology comes as whole
+numbers. The shapes are those of :class:`.arrays.FrameArrays` and :class:`.shapes.Shapes`.
 """
 
 import jax
 import jax.numpy as jnp
 from jax import Array
 
-from .elements import Properties, end_forces, member_stiffness
+from .arrays import FrameArrays
+from .elements import Properties, member_stiffness
+from .shapes import Shapes
 
 
-def assemble(coordinates: Array, ends: Array, up: Array, properties: Properties) -> Array:
-    """Stiffness of all nodes, without clamps or rigid bodies, shape (6 n_nodes, 6 n_nodes)."""
-    start, end = coordinates[ends[:, 0]], coordinates[ends[:, 1]]
-    members = jax.vmap(member_stiffness)(start, end, up, properties)
+def member_shapes(arrays: FrameArrays) -> Shapes:
+    """The members at rest, as the functions here and in :mod:`.elements` take them."""
+    return Shapes(arrays.lengths, arrays.axes.transpose(1, 2, 0), arrays.bends.T)
+
+
+def assemble(shapes: Shapes, ends: Array, properties: Properties, n_nodes: int) -> tuple[Array, Array]:
+    """The stiffness, without clamps, supports or rigid bodies, and what recovers the end forces.
+
+    Returns
+    -------
+    stiffness : Array, shape (6 n_nodes, 6 n_nodes)
+    recovery : Array, shape (n_members, 12, 12)
+        Forces on both ends in local axes per motion of the ends in global axes.
+    """
+    members, recovery = jax.vmap(member_stiffness, in_axes=(-1, 0))(shapes, properties)
     unknowns = _unknowns(ends).reshape(-1, 12)
-    size = 6 * len(coordinates)
-    return jnp.zeros((size, size)).at[unknowns[:, :, None], unknowns[:, None, :]].add(members)
+    empty = jnp.zeros((6 * n_nodes, 6 * n_nodes))
+    return empty.at[unknowns[:, :, None], unknowns[:, None, :]].add(members), recovery
 
 
 def transformation(coordinates: Array, master: Array, block: Array, n_blocks: int) -> Array:
@@ -36,22 +49,17 @@ def transformation(coordinates: Array, master: Array, block: Array, n_blocks: in
 
 
 def reduce(stiffness: Array, kinematics: Array) -> Array:
-    """Stiffness of the blocks, Tᵀ K T; exact, since rigid bodies are kinematics and not stiff members."""
+    """Stiffness of the unknowns, Tᵀ K T; exact, since rigid bodies are kinematics and not stiff members."""
     return kinematics.T @ stiffness @ kinematics
 
 
-def member_end_forces(
-    coordinates: Array, ends: Array, up: Array, properties: Properties, displacements: Array
-) -> Array:
-    """Forces on both ends of each member in local axes, shape (n_cases, n_members, 2, 6).
+def member_end_forces(recovery: Array, ends: Array, displacements: Array) -> Array:
+    """Forces that the nodes exert on both ends of each member, in its local axes there.
 
-    `displacements` has shape (n_cases, n_nodes, 6), in global axes.
+    From `displacements` in global axes, shape (n_cases, n_nodes, 6), to (n_cases, n_members, 2, 6).
     """
-    start, end = coordinates[ends[:, 0]], coordinates[ends[:, 1]]
-    n_cases = len(displacements)
-    moved = displacements[:, ends].reshape(n_cases, len(ends), 12)
-    forces = jax.vmap(end_forces, in_axes=(0, 0, 0, 0, 1), out_axes=1)(start, end, up, properties, moved)
-    return forces.reshape(n_cases, len(ends), 2, 6)
+    moved = displacements[:, ends].reshape(len(displacements), len(ends), 12)
+    return jnp.einsum("mij,cmj->cmi", recovery, moved).reshape(len(displacements), len(ends), 2, 6)
 
 
 def _unknowns(nodes: Array) -> Array:

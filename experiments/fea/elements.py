@@ -1,21 +1,30 @@
-"""The straight two-node Timoshenko beam in space.
+"""The two-node Timoshenko beam in space, straight or a circular arc.
 
-Pure functions of one member, to be mapped over members with ``jax.vmap``; differentiable in
-coordinates and properties. The stiffness is exact for loads at the ends.
+Pure functions of one member, to be mapped over members with ``jax.vmap``; differentiable in its shape
+and properties. The stiffness is exact for loads at the ends: in closed form for a straight member, by
+the complementary energy of the loaded end for an arc.
 
-Source: Przemieniecki, Theory of Matrix Structural Analysis (1968), §5.6.
+Source: Przemieniecki, Theory of Matrix Structural Analysis (1968), §5.6 (straight), ch. 7 (flexibility).
 """
 
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
+from jax.scipy.linalg import block_diag
+
+from .blocks import skew
+from .shapes import Shapes
 
 # The four unknowns of each bending plane among the twelve of a member, and the sign of its slopes:
 # in the xy-plane θz = dv/dx, in the xz-plane θy = −dw/dx.
 XY, XZ = (1, 5, 7, 11), (2, 4, 8, 10)
 XZ_SIGNS = np.array([1.0, -1.0, 1.0, -1.0])
+
+# The integrand has frequencies of up to four times the bend: 24 points give float64 to a full turn.
+GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 
 class Properties(NamedTuple):
@@ -31,18 +40,26 @@ class Properties(NamedTuple):
     shear_area_z: Array
 
 
-def local_axes(start: Array, end: Array, up: Array) -> Array:
-    """Rotation from global to local axes, shape (3, 3): its rows are the local x, y, z."""
-    x = end - start
-    x = x / jnp.linalg.norm(x)
-    z = up - x * (up @ x)
-    z = z / jnp.linalg.norm(z)
-    return jnp.stack([x, jnp.cross(z, x), z])
+def along(shape: Shapes, s: Array | float) -> tuple[Array, Array]:
+    """The section at the fraction `s` of a member's length, in the axes of its start.
+
+    Returns
+    -------
+    place : Array, shape (3,)
+        From the start, m.
+    turn : Array, shape (3, 3)
+        From its own axes to those of the start.
+    """
+    spin = skew(shape.bend) * s
+    sine, versine = _sine_and_versine((shape.bend @ shape.bend) * s**2)
+    turn = jnp.eye(3) + sine * spin + versine * spin @ spin
+    return shape.length * s * (sine * jnp.eye(3)[0] + versine * spin[:, 0]), turn
 
 
-def rotation(start: Array, end: Array, up: Array) -> Array:
-    """Rotation of a member's twelve unknowns from global to local axes, shape (12, 12)."""
-    return jnp.kron(jnp.eye(4), local_axes(start, end, up))
+def rotation(shape: Shapes) -> Array:
+    """Rotation of a member's twelve unknowns from global to its local axes at each end, shape (12, 12)."""
+    start, end = shape.axes, along(shape, 1.0)[1].T @ shape.axes
+    return block_diag(start, start, end, end)
 
 
 def shear_parameters(length: Array, p: Properties) -> tuple[Array, Array]:
@@ -52,7 +69,7 @@ def shear_parameters(length: Array, p: Properties) -> tuple[Array, Array]:
     return phi_y, phi_z
 
 
-def local_stiffness(length: Array, p: Properties) -> Array:
+def straight_stiffness(length: Array, p: Properties) -> Array:
     """Stiffness in local axes, shape (12, 12); unknowns (u, v, w, θx, θy, θz) at start, then at end."""
     phi_y, phi_z = shear_parameters(length, p)
     rod = jnp.array([[1.0, -1.0], [-1.0, 1.0]])
@@ -64,28 +81,57 @@ def local_stiffness(length: Array, p: Properties) -> Array:
     return k.at[np.ix_(XY, XY)].set(xy).at[np.ix_(XZ, XZ)].set(xz)
 
 
-def member_stiffness(start: Array, end: Array, up: Array, p: Properties) -> Array:
-    """Stiffness in global axes, shape (12, 12), from the end points (3,), `up` (3,) and properties."""
-    turn = rotation(start, end, up)
-    return turn.T @ local_stiffness(jnp.linalg.norm(end - start), p) @ turn
+def flexibility(shape: Shapes, p: Properties, s: Array | float = 1.0) -> Array:
+    """Motion of the section at `s`, the start held, per wrench upon it; in the axes of the start, (6, 6).
 
-
-def end_forces(start: Array, end: Array, up: Array, p: Properties, displacements: Array) -> Array:
-    """Forces that the nodes exert on the member, in local axes, N and N m.
-
-    Parameters
-    ----------
-    start, end, up : Array, shape (3,)
-    p : Properties
-    displacements : Array, shape (..., 12)
-        Motions of both ends in global axes, m and rad.
-
-    Returns
-    -------
-    Array, shape (..., 12)
+    The wrench w gives the section at t ≤ s the internal forces B w in its own axes, and the
+    complementary energy ½ ∫ wᵀ Bᵀ C B w dx, with C the compliance of the section.
     """
-    k = local_stiffness(jnp.linalg.norm(end - start), p)
-    return displacements @ rotation(start, end, up).T @ k
+    loaded = along(shape, s)[0]
+    compliance = jnp.stack(
+        [
+            1 / (p.young * p.area),
+            _inverse(p.shear_area_y) / p.shear,
+            _inverse(p.shear_area_z) / p.shear,
+            1 / (p.shear * p.torsion_constant),
+            1 / (p.young * p.second_moment_y),
+            1 / (p.young * p.second_moment_z),
+        ]
+    )
+
+    def per_length(t: Array) -> Array:
+        place, turn = along(shape, t)
+        internal = jnp.block([[turn.T, jnp.zeros((3, 3))], [turn.T @ skew(loaded - place), turn.T]])
+        return (internal.T * compliance) @ internal
+
+    at_points = jax.vmap(per_length)(jnp.asarray(s * (1 + GAUSS_POINTS) / 2))
+    return shape.length * s / 2 * jnp.tensordot(GAUSS_WEIGHTS, at_points, axes=1)
+
+
+def arc_stiffness(shape: Shapes, p: Properties) -> Array:
+    """Stiffness of an arc, H F⁻¹ Hᵀ, in the local axes at each end, shape (12, 12).
+
+    Hᵀ gives the motion of the end beside that of the start as a rigid body, in the axes of the start.
+    """
+    f = flexibility(shape, p)
+    scale = 1 / jnp.sqrt(jnp.diag(f))
+    inverse = scale[:, None] * jnp.linalg.inv(scale[:, None] * f * scale) * scale
+    place, turn = along(shape, 1.0)
+    unit, none = jnp.eye(3), jnp.zeros((3, 3))
+    deformation = jnp.block([[-unit, skew(place), turn, none], [none, -unit, none, turn]])
+    return deformation.T @ (inverse + inverse.T) @ deformation / 2
+
+
+def local_stiffness(shape: Shapes, p: Properties) -> Array:
+    """Stiffness in the local axes at each end, shape (12, 12)."""
+    return jnp.where(jnp.any(shape.bend != 0), arc_stiffness(shape, p), straight_stiffness(shape.length, p))
+
+
+def member_stiffness(shape: Shapes, p: Properties) -> tuple[Array, Array]:
+    """Stiffness in global axes, and end forces in local axes per motion in global axes; (12, 12) each."""
+    turn = rotation(shape)
+    recovery = local_stiffness(shape, p) @ turn
+    return turn.T @ recovery, recovery
 
 
 def _bending(length: Array, bending_stiffness: Array, phi: Array) -> Array:
@@ -99,3 +145,14 @@ def _inverse(shear_area: Array) -> Array:
     """1/A, zero where A is infinite; both branches are finite, so that derivatives are too."""
     finite = jnp.isfinite(shear_area)
     return jnp.where(finite, 1 / jnp.where(finite, shear_area, 1.0), 0.0)
+
+
+def _sine_and_versine(square: Array) -> tuple[Array, Array]:
+    """sin x / x and (1 − cos x) / x² of x²; differentiable at zero, where three terms give float64."""
+
+    def sine(square: Array) -> Array:
+        small = square < 1e-4
+        x = jnp.sqrt(jnp.where(small, 1.0, square))
+        return jnp.where(small, 1 - square / 6 * (1 - square / 20), jnp.sin(x) / x)
+
+    return sine(square), sine(square / 4) ** 2 / 2

@@ -229,5 +229,3 @@ def _eliminate(rounds: tuple[Round, ...], blocks: Array, right: Array) -> tuple[
     back = multiply(to, known).reshape(*right.shape[:2], k, degree, right.shape[-1]).sum(axis=3)
     joined = jnp.concatenate([solution, own - back], axis=2)
     return joined[:, :, np.argsort(np.concatenate([now.kept_bodies, now.bodies]))], negative + more
-
-

@@ -15,8 +15,9 @@ from scipy.linalg import get_lapack_funcs
 from . import assembly
 from .arrays import FrameArrays, frame_arrays
 from .mechanisms import check_finite, check_held, check_resolved
-from .model import Frame, Load
+from .model import MOTIONS, Frame, Load, Motion
 from .precision import check_float64_scope, in_float64
+from .stress import PeakStress, peak_stress
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,91 +29,133 @@ class Solution:
     frame : Frame
     loads : ndarray, shape (n_cases, n_nodes, 6)
         What was applied: forces N, moments N m.
+    motions : ndarray, shape (n_cases, n_nodes, 6)
+        What was prescribed: translations m, rotations rad.
     displacements : ndarray, shape (n_cases, n_nodes, 6)
         (ux, uy, uz, θx, θy, θz) of each node in global axes.
     reactions : ndarray, shape (n_cases, n_clamps, 6)
         What each clamp exerts on the frame, at the clamped node, in the order of ``frame.clamps``.
+    support_reactions : ndarray, shape (n_cases, n_supports, 6)
+        The same of ``frame.supports``; zero in the motions that a support leaves free.
     end_forces : ndarray, shape (n_cases, n_members, 2, 6)
-        What the nodes exert on the start and the end of each member, in its local axes.
+        What the nodes exert on the start and the end of each member, in its local axes there; those of
+        an arc turn with it.
     """
 
     frame: Frame
     loads: NDArray[np.float64]
+    motions: NDArray[np.float64]
     displacements: NDArray[np.float64]
     reactions: NDArray[np.float64]
+    support_reactions: NDArray[np.float64]
     end_forces: NDArray[np.float64]
 
     def at(self, node: str) -> NDArray[np.float64]:
         """Displacements of one node in all cases, shape (n_cases, 6); ``ValueError`` if it is unknown."""
         return self.displacements[:, self.frame.index(node)]
 
+    def stress(self) -> PeakStress:
+        """Largest bending stress of each member in each case, and where along the member it is."""
+        return peak_stress(self.frame.members, frame_arrays(self.frame), self.end_forces)
+
 
 @dataclass(frozen=True, eq=False)
 class LinearSolver:
     """A factorised frame; made by :func:`factorise`.
 
-    With q the motions of the free blocks, u = T q, D K_r D = L Lᵀ and K_r = Tᵀ K T.
+    With q the free motions of the blocks and p the prescribed ones, u = T q + H p, and
+    Tᵀ K T q = Tᵀ (f − K H p), D Tᵀ K T D = L Lᵀ.
 
     Parameters
     ----------
     frame : Frame
     arrays : FrameArrays
     stiffness : ndarray, shape (6 n_nodes, 6 n_nodes)
-        K, without clamps or rigid bodies.
-    kinematics : ndarray, shape (6 n_nodes, 6 n_blocks)
-        T for all blocks, the free ones first.
-    scale : ndarray, shape (6 n_free,)
-        D, which gives D K_r D a unit diagonal.
-    factor : ndarray, shape (6 n_free, 6 n_free)
+        K, without clamps, supports or rigid bodies.
+    recovery : ndarray, shape (n_members, 12, 12)
+        From the motions of a member's ends in global axes to its end forces in local axes.
+    kinematics : ndarray, shape (6 n_nodes, n_unknowns)
+        T, of the motions of blocks that nothing holds.
+    holding : ndarray, shape (6 n_nodes, 6 (n_supports + n_clamps))
+        H, of the motions of supports and then of clamps; zero for those that a support leaves free.
+    scale : ndarray, shape (n_unknowns,)
+        D, which gives D Tᵀ K T D a unit diagonal.
+    factor : ndarray, shape (n_unknowns, n_unknowns)
         L, lower triangular.
     reciprocal_condition : float
-        Of D K_r D; about −log₁₀(2e-16 / it) digits of an answer are right, or more.
+        Of D Tᵀ K T D; about −log₁₀(2e-16 / it) digits of an answer are right, or more.
     """
 
     frame: Frame
     arrays: FrameArrays
     stiffness: NDArray[np.float64]
+    recovery: NDArray[np.float64]
     kinematics: NDArray[np.float64]
+    holding: NDArray[np.float64]
     scale: NDArray[np.float64]
     factor: NDArray[np.float64]
     reciprocal_condition: float
 
     @in_float64
-    def solve(self, loads: ArrayLike) -> Solution:
-        """Displacements, reactions and end forces under `loads`, shape (n_cases, n_nodes, 6).
+    def solve(self, loads: ArrayLike, motions: ArrayLike | None = None) -> Solution:
+        """Displacements, reactions and end forces under loads and prescribed motions.
+
+        Parameters
+        ----------
+        loads : array_like, shape (n_cases, n_nodes, 6)
+        motions : array_like, shape (n_cases, n_nodes, 6), optional
+            Not zero only where a support holds its node; taken as small, rotations too.
 
         Raises
         ------
         ValueError
-            If the loads have another shape or are not finite.
+            If an array has another shape or is not finite, or a motion is prescribed that no support holds.
         """
-        loads = _checked_loads(self.frame, loads)
-        a = self.arrays
-        u = _displacements(self.kinematics, self.scale, self.factor, loads)
-        reactions = _reactions(self.stiffness, self.kinematics[:, 6 * a.n_free :], loads, u)
-        forces = _end_forces(a.coordinates, a.ends, a.up, a.properties, u)
-        return Solution(self.frame, loads, np.asarray(u), np.asarray(reactions), np.asarray(forces))
+        frame = self.frame
+        loads = _checked("loads", frame, loads)
+        moved = None if motions is None else _checked_motions(frame, motions, len(loads))
+        u = self._moved(loads, moved)
+        reactions = np.asarray(_reactions(self.stiffness, self.holding, loads, u))
+        forces = _end_forces(self.recovery, self.arrays.ends, u)
+        n = len(frame.supports)
+        return Solution(
+            frame,
+            loads,
+            np.zeros_like(loads) if moved is None else moved,
+            np.asarray(u),
+            reactions[:, n:],
+            reactions[:, :n],
+            np.asarray(forces),
+        )
 
-    def displacements(self, loads: ArrayLike) -> Array:
-        """Displacements under `loads`, shape (..., n_nodes, 6) to the same, by JAX alone.
+    def displacements(self, loads: ArrayLike, motions: ArrayLike | None = None) -> Array:
+        """Displacements under `loads` and `motions`, shape (..., n_nodes, 6) to the same, by JAX alone.
 
         For use inside an outer ``jit``, ``vmap`` or ``grad``, called in ``with jax.enable_x64(True):``.
-        The values of the loads are not looked at, so one that is not finite gives NaN.
+        The values are not looked at: one that is not finite gives NaN, and of the motions only those
+        that supports hold are read.
 
         Raises
         ------
         ValueError
-            If it is called outside that scope, or the loads have another shape.
+            If it is called outside that scope, or the arrays have another shape.
         """
         check_float64_scope()
-        if jnp.shape(loads)[-2:] != (len(self.frame.nodes), 6):
-            raise ValueError(_shape_sentence(self.frame, jnp.shape(loads)))
-        return _displacements(self.kinematics, self.scale, self.factor, jnp.asarray(loads, jnp.float64))
+        given = [jnp.asarray(x, jnp.float64) for x in (loads, motions) if x is not None]
+        for what, x in zip(("loads", "motions"), given, strict=False):
+            if x.shape[-2:] != (len(self.frame.nodes), 6):
+                raise ValueError(_shape_sentence(what, self.frame, x.shape))
+        return self._moved(*jnp.broadcast_arrays(*given))
+
+    def _moved(self, loads: Array | NDArray[np.float64], motions: Array | NDArray[np.float64] | None = None) -> Array:
+        nodes = [self.frame.index(s.node) for s in self.frame.supports]
+        driven = None if motions is None or not nodes else motions[..., nodes, :]
+        return _displacements(self.stiffness, self.kinematics, self.holding, self.scale, self.factor, loads, driven)
 
 
 @in_float64
 def factorise(frame: Frame) -> LinearSolver:
-    """Assemble `frame`, tie its rigid bodies, hold its clamps, and factorise what is left.
+    """Assemble `frame`, tie its rigid bodies, hold its clamps and supports, and factorise what is left.
 
     Raises
     ------
@@ -121,16 +164,20 @@ def factorise(frame: Frame) -> LinearSolver:
     """
     a = frame_arrays(frame)
     check_held(frame, a)
-    stiffness = _frozen(_assemble(a.coordinates, a.ends, a.up, a.properties))
-    kinematics = _frozen(_transformation(a.coordinates, a.master, a.block, a.n_blocks))
-    free = kinematics[:, : 6 * a.n_free]
-    reduced = np.asarray(_reduce(stiffness, free))
+    assembled = _assemble(assembly.member_shapes(a), a.ends, a.properties, len(frame.nodes))
+    stiffness, recovery = map(_frozen, assembled)
+    of_blocks = np.asarray(_transformation(a.coordinates, a.master, a.block, a.n_blocks))
+    kinematics = _frozen(of_blocks[:, ~a.held.ravel()])
+    blocks = a.block[[frame.index(n) for n in (*(s.node for s in frame.supports), *frame.clamps)]]
+    holding = of_blocks.reshape(-1, a.n_blocks, 6)[:, blocks] * a.held[blocks]
+    reduced = np.asarray(_reduce(stiffness, kinematics))
     check_finite(reduced)
     scale = 1 / np.sqrt(np.diag(reduced))
     scaled = scale[:, None] * reduced * scale
     factor, condition = _cholesky(scaled)
-    check_resolved(frame, condition, scaled, scale, free)
-    return LinearSolver(frame, a, stiffness, kinematics, _frozen(scale), _frozen(factor), condition)
+    check_resolved(frame, condition, scaled, scale, kinematics)
+    holding = _frozen(holding.reshape(len(stiffness), -1))
+    return LinearSolver(frame, a, stiffness, recovery, kinematics, holding, _frozen(scale), _frozen(factor), condition)
 
 
 def load_array(frame: Frame, cases: Iterable[Iterable[Load]]) -> NDArray[np.float64]:
@@ -149,27 +196,52 @@ def load_array(frame: Frame, cases: Iterable[Iterable[Load]]) -> NDArray[np.floa
     return loads
 
 
+def motion_array(frame: Frame, cases: Iterable[Iterable[Motion]]) -> NDArray[np.float64]:
+    """Prescribed motions as an array, shape (n_cases, n_nodes, 6), m and rad.
+
+    Raises
+    ------
+    ValueError
+        If a motion names an unknown node, or one case has two of the same node: large rotations do not add up.
+    """
+    cases = [tuple(case) for case in cases]
+    motions = np.zeros((len(cases), len(frame.nodes), 6))
+    for number, case in enumerate(cases):
+        names = [motion.node for motion in case]
+        for motion in case:
+            if names.count(motion.node) > 1:
+                raise ValueError(f"motion case {number} moves node {motion.node!r} twice: give it one motion")
+            motions[number, frame.index(motion.node)] = (*motion.translation, *motion.rotation)
+    return motions
+
+
 dpotrf, dpocon = get_lapack_funcs(("potrf", "pocon"), dtype=np.float64)
 
-_assemble = jax.jit(assembly.assemble)
+_assemble = jax.jit(assembly.assemble, static_argnums=3)
 _transformation = jax.jit(assembly.transformation, static_argnums=3)
 _reduce = jax.jit(assembly.reduce)
 _end_forces = jax.jit(assembly.member_end_forces)
 
 
 @jax.jit
-def _displacements(kinematics: Array, scale: Array, factor: Array, loads: Array) -> Array:
-    free = kinematics[:, : len(scale)]
-    on_blocks = loads.reshape(-1, len(free)) @ free
-    q = cho_solve((factor, True), (on_blocks * scale).T).T * scale
-    return (q @ free.T).reshape(loads.shape)
+def _displacements(
+    stiffness: Array, kinematics: Array, holding: Array, scale: Array, factor: Array, loads: Array, driven: Array | None
+) -> Array:
+    """u = T q + H p; `driven` is p, shape (..., n_supports, 6), None for zero."""
+    forces, at_supports = loads.reshape(-1, len(stiffness)), 0.0
+    if driven is not None:
+        p = driven.reshape(-1, 6 * driven.shape[-2])
+        at_supports = p @ holding[:, : p.shape[1]].T
+        forces = forces - at_supports @ stiffness
+    q = cho_solve((factor, True), (forces @ kinematics * scale).T).T * scale
+    return (q @ kinematics.T + at_supports).reshape(loads.shape)
 
 
 @jax.jit
-def _reactions(stiffness: Array, clamped: Array, loads: Array, displacements: Array) -> Array:
-    """What the clamps must add for equilibrium, Tᵀ (K u − f), shape (n_cases, n_clamps, 6)."""
+def _reactions(stiffness: Array, holding: Array, loads: Array, displacements: Array) -> Array:
+    """What holds the frame must add for equilibrium, Hᵀ (K u − f), shape (n_cases, n_supports + n_clamps, 6)."""
     missing = displacements.reshape(-1, len(stiffness)) @ stiffness - loads.reshape(-1, len(stiffness))
-    return (missing @ clamped).reshape(len(loads), clamped.shape[1] // 6, 6)
+    return (missing @ holding).reshape(len(loads), holding.shape[1] // 6, 6)
 
 
 def _cholesky(scaled: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
@@ -182,22 +254,41 @@ def _cholesky(scaled: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
     return factor, float(dpocon(factor, np.abs(scaled).sum(axis=0).max(), uplo="L")[0])
 
 
-def _checked_loads(frame: Frame, loads: ArrayLike) -> NDArray[np.float64]:
-    loads = np.array(loads, dtype=np.float64)
-    if loads.ndim != 3 or loads.shape[1:] != (len(frame.nodes), 6):
-        raise ValueError(_shape_sentence(frame, loads.shape))
-    bad = np.argwhere(~np.isfinite(loads))
+def _checked(what: str, frame: Frame, values: ArrayLike) -> NDArray[np.float64]:
+    """Loads or motions as float64; ``ValueError`` if their shape is another or one is not finite."""
+    values = np.array(values, dtype=np.float64)
+    if values.ndim != 3 or values.shape[1:] != (len(frame.nodes), 6):
+        raise ValueError(_shape_sentence(what, frame, values.shape))
+    bad = np.argwhere(~np.isfinite(values))
     if bad.size:
         case, node, _ = bad[0]
-        raise ValueError(f"load case {case} on node {frame.node_names[node]!r} is not finite: give finite loads")
-    return loads
+        of = {"loads": "load case {} on", "motions": "motion case {} of"}[what].format(case)
+        raise ValueError(f"{of} node {frame.node_names[node]!r} is not finite: give finite {what}")
+    return values
 
 
-def _shape_sentence(frame: Frame, shape: tuple[int, ...]) -> str:
-    return (
-        f"loads must have shape (n_cases, {len(frame.nodes)}, 6), three forces and three moments a node; "
-        f"got shape {shape}"
-    )
+def _checked_motions(frame: Frame, motions: ArrayLike, n_cases: int) -> NDArray[np.float64]:
+    motions = _checked("motions", frame, motions)
+    if len(motions) != n_cases:
+        raise ValueError(f"there are {n_cases} load cases and {len(motions)} motion cases: give as many of both")
+    held = np.zeros(motions.shape[1:], dtype=bool)
+    for support in frame.supports:
+        held[frame.index(support.node)] = support.held
+    bad = np.argwhere((motions != 0) & ~held)
+    if bad.size:
+        case, node, motion = bad[0]
+        name = frame.node_names[node]
+        why = "a clamp keeps at rest: make it a support" if name in frame.clamps else "no support holds: support it"
+        raise ValueError(
+            f"motion case {case} moves node {name!r} in {MOTIONS[motion]!r}, which {why} that holds "
+            f"{MOTIONS[motion]!r}, or leave this motion zero"
+        )
+    return motions
+
+
+def _shape_sentence(what: str, frame: Frame, shape: tuple[int, ...]) -> str:
+    each = {"loads": "three forces and three moments", "motions": "three translations and three rotations"}[what]
+    return f"{what} must have shape (n_cases, {len(frame.nodes)}, 6), {each} a node; got shape {shape}"
 
 
 def _frozen(array: ArrayLike) -> NDArray[np.float64]:

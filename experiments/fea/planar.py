@@ -6,10 +6,11 @@ The batch lies in the last axes of every array.
 from typing import ClassVar
 
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from .blocks import apply
-from .rods import Along, Components, Rods, even_series, integrate
+from .rods import Along, Components, Rods, even_series, integrate, with_start
 
 
 class Planar:
@@ -17,7 +18,9 @@ class Planar:
 
     size: ClassVar[int] = 3
     n_pose: ClassVar[int] = 3
+    n_translations: ClassVar[int] = 2
     n_dead: ClassVar[int] = 5
+    unturned: ClassVar = np.array([0.0])
     motions: ClassVar[tuple[int, ...]] = (0, 1, 5)
     """Which of the six motions of a node these are."""
 
@@ -55,14 +58,11 @@ class Planar:
         """Pose of the end body in the axes of the start body, under the wrench (3, ...) about its origin."""
         return self._along(wrench, rods, n_steps, trace=False)[0]
 
-    def along(self, wrench: Array, rods: Rods, n_steps: int) -> Along:
-        """What is met along the members."""
-        start, met = self._along(wrench, rods, n_steps, trace=True)[1:]
-        (internal, pose), (there, poses) = start, met
-        return Along(
-            jnp.stack([jnp.concatenate([a[None], b]) for a, b in zip(internal, there, strict=True)]),
-            jnp.stack([jnp.concatenate([a[None], b]) for a, b in zip(pose, poses, strict=True)][:3]),
-        )
+    def law_along(self, wrench: Array, rods: Rods, n_steps: int) -> tuple[Array, Along]:
+        """The same, and what is met along the members."""
+        law, (internal, pose), (internals, poses) = self._along(wrench, rods, n_steps, trace=True)
+        met = Along(with_start(internal, internals), with_start(pose, poses)[:3])
+        return law, met
 
     def _along(self, wrench: Array, rods: Rods, n_steps: int, trace: bool) -> tuple:
         fx, fy, m = wrench
@@ -100,10 +100,6 @@ class Planar:
     def towards(self, goal: Array, pose: Array) -> Array:
         """Motion in global axes from `pose` to `goal`."""
         return goal - pose
-
-    def goal(self, motion: Array) -> Array:
-        """Pose of a body that was moved from its place at rest, the origin, by translation and rotation (3, ...)."""
-        return motion
 
     # --- matrices of a member, in global axes -----------------------------------------------------
 

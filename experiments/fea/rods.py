@@ -105,6 +105,11 @@ def integrate(
     return end, met
 
 
+def with_start(start: Components, met: Components) -> Array:
+    """The components at the ends of the steps with those at the start before them, (n, n_steps + 1, ...)."""
+    return jnp.stack([jnp.concatenate([a[None], b]) for a, b in zip(start, met, strict=True)])
+
+
 def _runge_kutta(rates: Any, here: Components, h: Array) -> tuple[Components, Components]:
     """The next internal wrench and, by Hermite's cubic, that in the middle of the step."""
 
@@ -117,9 +122,7 @@ def _runge_kutta(rates: Any, here: Components, h: Array) -> tuple[Components, Co
     k4 = rates(ahead(k3, h))
     mean = tuple((a + 2 * b + 2 * c + d) / 6 for a, b, c, d in zip(k1, k2, k3, k4, strict=True))
     there = ahead(mean, h)
-    middle = tuple(
-        (x + y) / 2 + h / 8 * (a - b) for x, y, a, b in zip(here, there, k1, rates(there), strict=True)
-    )
+    middle = tuple((x + y) / 2 + h / 8 * (a - b) for x, y, a, b in zip(here, there, k1, rates(there), strict=True))
     return there, middle
 
 

@@ -7,10 +7,12 @@ multiplies the quaternion, so that large rotations have no order in which they w
 from typing import ClassVar
 
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
+from numpy.typing import NDArray
 
 from .blocks import apply, four, skew
-from .rods import Along, Components, Rods, even_series, integrate
+from .rods import Along, Components, Rods, even_series, integrate, with_start
 
 
 class Spatial:
@@ -18,7 +20,9 @@ class Spatial:
 
     size: ClassVar[int] = 6
     n_pose: ClassVar[int] = 7
+    n_translations: ClassVar[int] = 3
     n_dead: ClassVar[int] = 15
+    unturned: ClassVar = np.array([1.0, 0.0, 0.0, 0.0])
     motions: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4, 5)
     """Which of the six motions of a node these are."""
 
@@ -43,38 +47,35 @@ class Spatial:
         twice = _cross(turn, once)
         first, second = even_series(square, 2) / 2, even_series(square, 3) / 6
         chord = tuple(a + first * b + second * c for a, b, c in zip(ahead, once, twice, strict=True))
-        step = _rotated(quaternion, chord)
-        turned = _product(quaternion, (cosine, *(sine * t / 2 for t in turn)))
+        step = rotated(quaternion, chord)
+        turned = product(quaternion, (cosine, *(sine * t / 2 for t in turn)))
         return (*(a + b for a, b in zip(place, step, strict=True)), *turned)
 
     def law(self, wrench: Array, rods: Rods, n_steps: int) -> Array:
         """Pose of the end body in the axes of the start body, under the wrench (6, ...) about its origin."""
         return self._along(wrench, rods, n_steps, trace=False)[0]
 
-    def along(self, wrench: Array, rods: Rods, n_steps: int) -> Along:
-        """What is met along the members."""
-        start, met = self._along(wrench, rods, n_steps, trace=True)[1:]
-        (internal, pose), (there, poses) = start, met
-        return Along(
-            jnp.stack([jnp.concatenate([a[None], b]) for a, b in zip(internal, there, strict=True)]),
-            jnp.stack([jnp.concatenate([a[None], b]) for a, b in zip(pose, poses, strict=True)]),
-        )
+    def law_along(self, wrench: Array, rods: Rods, n_steps: int) -> tuple[Array, Along]:
+        """The same, and what is met along the members."""
+        law, (internal, pose), (internals, poses) = self._along(wrench, rods, n_steps, trace=True)
+        met = Along(with_start(internal, internals), with_start(pose, poses))
+        return law, met
 
     def _along(self, wrench: Array, rods: Rods, n_steps: int, trace: bool) -> tuple:
         pose = tuple(part + jnp.zeros_like(wrench[0]) for part in rods.start)
-        back = _conjugate(pose[3:])
+        back = conjugate(pose[3:])
         force, moment = tuple(wrench[:3]), tuple(wrench[3:])
         moment = tuple(a - b for a, b in zip(moment, _cross(pose[:3], force), strict=True))
-        internal = (*_rotated(back, force), *_rotated(back, moment))
+        internal = (*rotated(back, force), *rotated(back, moment))
         end, met = integrate(self, internal, pose, rods, n_steps, trace)
-        place = tuple(a + b for a, b in zip(end[:3], _rotated(end[3:], tuple(rods.end[:3])), strict=True))
-        return jnp.stack([*place, *_product(end[3:], tuple(rods.end[3:]))]), (internal, pose), met
+        place = tuple(a + b for a, b in zip(end[:3], rotated(end[3:], tuple(rods.end[:3])), strict=True))
+        return jnp.stack([*place, *product(end[3:], tuple(rods.end[3:]))]), (internal, pose), met
 
     # --- poses ----------------------------------------------------------------------------------
 
     def spin(self, pose: Array, change: Array) -> Array:
         """Motion, translation and spin, that belongs to a `change` of the numbers of a pose."""
-        twice = _product(tuple(change[3:]), _conjugate(tuple(pose[3:])))
+        twice = product(tuple(change[3:]), conjugate(tuple(pose[3:])))
         return jnp.stack([*change[:3], *(2 * part for part in twice[1:])])
 
     def turn(self, pose: Array) -> Array:
@@ -84,25 +85,21 @@ class Spatial:
 
     def gap(self, start: Array, end: Array, law: Array) -> Array:
         """Motion, in the axes of the start, from where a member's law puts its end body to where that is."""
-        back = _conjugate(tuple(start[3:]))
-        place = jnp.stack(_rotated(back, tuple(end[:3] - start[:3]))) - law[:3]
-        turned = _product(back, tuple(end[3:]))
-        return jnp.concatenate([place, rotation_vector(jnp.stack(_product(turned, _conjugate(tuple(law[3:])))))])
+        back = conjugate(tuple(start[3:]))
+        place = jnp.stack(rotated(back, tuple(end[:3] - start[:3]))) - law[:3]
+        turned = product(back, tuple(end[3:]))
+        return jnp.concatenate([place, rotation_vector(jnp.stack(product(turned, conjugate(tuple(law[3:])))))])
 
     def moved(self, pose: Array, motion: Array) -> Array:
         """The pose after a motion in global axes."""
-        turned = _product(tuple(quaternion(motion[3:])), tuple(pose[3:]))
+        turned = product(tuple(quaternion(motion[3:])), tuple(pose[3:]))
         size = jnp.sqrt(sum(part * part for part in turned))
         return jnp.stack([*(pose[:3] + motion[:3]), *(part / size for part in turned)])
 
     def towards(self, goal: Array, pose: Array) -> Array:
         """Motion in global axes from `pose` to `goal`, by the shorter turn."""
-        turned = _product(tuple(goal[3:]), _conjugate(tuple(pose[3:])))
+        turned = product(tuple(goal[3:]), conjugate(tuple(pose[3:])))
         return jnp.concatenate([goal[:3] - pose[:3], rotation_vector(jnp.stack(turned))])
-
-    def goal(self, motion: Array) -> Array:
-        """Pose of a body moved from the origin by a translation and a rotation vector (6, ...)."""
-        return jnp.concatenate([motion[:3], quaternion(motion[3:])])
 
     # --- matrices of a member, in global axes -----------------------------------------------------
 
@@ -179,6 +176,26 @@ def rotation_vector(q: Array) -> Array:
     return factor * q[1:]
 
 
+def quaternion_of(matrix: Array, largest: NDArray[np.int64]) -> Array:
+    """Unit quaternion of rotation matrices (3, 3, n, ...), given which component is largest of each, (n,).
+
+    Source: Shepperd, J. Guidance and Control 1 (1978), 223–224.
+    """
+    m = matrix
+    xx, yy, zz, one = m[0, 0], m[1, 1], m[2, 2], 1.0
+    across = (m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1])
+    yz, zx, xy = m[2, 1] + m[1, 2], m[0, 2] + m[2, 0], m[1, 0] + m[0, 1]
+    table = [
+        (one + xx + yy + zz, *across),
+        (across[0], one + xx - yy - zz, xy, zx),
+        (across[1], xy, one - xx + yy - zz, yz),
+        (across[2], zx, yz, one - xx - yy + zz),
+    ]
+    rows = jnp.stack([jnp.stack(row) for row in table])  # each is 4 q_k q
+    row = rows[largest, :, np.arange(len(largest))].swapaxes(0, 1)
+    return row / jnp.sqrt((row * row).sum(0))
+
+
 def _unit(like: Array) -> Array:
     one, zero = jnp.ones_like(like), jnp.zeros_like(like)
     return jnp.stack([jnp.stack([one if i == j else zero for j in range(3)]) for i in range(3)])
@@ -190,7 +207,8 @@ def _cross(first: Components, second: Components) -> Components:
     return b * z - c * y, c * x - a * z, a * y - b * x
 
 
-def _product(first: Components, second: Components) -> Components:
+def product(first: Components, second: Components) -> Components:
+    """Hamilton's product of two quaternions."""
     a, b, c, d = first
     w, x, y, z = second
     return (
@@ -201,11 +219,12 @@ def _product(first: Components, second: Components) -> Components:
     )
 
 
-def _conjugate(q: Components) -> Components:
+def conjugate(q: Components) -> Components:
+    """Of a quaternion: the inverse, for a unit one."""
     return q[0], -q[1], -q[2], -q[3]
 
 
-def _rotated(q: Components, vector: Components) -> Components:
+def rotated(q: Components, vector: Components) -> Components:
     """q v q⁻¹ for a unit quaternion."""
     once = tuple(2 * part for part in _cross(q[1:], vector))
     twice = _cross(q[1:], once)

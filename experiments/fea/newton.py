@@ -1,0 +1,150 @@
+"""Newton's method on a batch of points: at one go where it contracts at once, else along the load in steps.
+
+A batch goes on until its slowest point is done, so the points that do not make it at one go are
+gathered and sent again, in steps of their own size: halved where Newton's method does not contract,
+doubled where it does so with ease. Nothing here raises: what becomes of a point is a number.
+
+Source: Deuflhard, Newton Methods for Nonlinear Problems (2004), §5.1 (a step along a path is short
+enough if the first corrections contract).
+"""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from .condensed import Problem, State, Topology
+from .tangent import flexibility, residual, step, tangent
+
+ACTIVE, CONVERGED, FAILED = 0, 1, 2
+
+SMALL = 1e-6
+"""Largest correction, in lengths and radians, after which a point counts as converged: the next is its square."""
+
+CONTRACTION = 0.5
+"""Corrections that shrink less than this end the attempt."""
+
+EASE = 0.1
+"""Corrections that shrink more than this let the next step be longer."""
+
+MOST = 3.0
+"""Largest correction, in lengths and radians, that is believed."""
+
+PATIENCE = 12
+"""Corrections in one attempt."""
+
+SHORTEST = 2.0**-14
+"""Fraction of the load below which a step is given up."""
+
+
+class March(NamedTuple):
+    """Where each point is; all arrays but the states have shape (n_points,).
+
+    Parameters
+    ----------
+    state, base : State
+        The current iterate, and the equilibrium that the attempt started from.
+    done, target, stride : Array
+        Fraction of the load at `base`, that aimed at, and their difference when it was chosen.
+    size, first : Array
+        Last correction, and the contraction of the first two in this attempt.
+    tries, iterations : Array of int
+        Corrections in this attempt, and in all.
+    status : Array of int
+    outset : Array, shape (D, n_blocks, n_points)
+        Motion of the very first correction.
+    """
+
+    state: State
+    base: State
+    done: Array
+    target: Array
+    stride: Array
+    size: Array
+    first: Array
+    tries: Array
+    iterations: Array
+    status: Array
+    outset: Array
+
+
+def begin(topology: Topology, problem: Problem, stride: Array) -> March:
+    """At rest, aiming at the fraction `stride` of the load, shape (n_points,)."""
+    zero = jnp.zeros_like(stride)
+    n_members = len(topology.start)
+    wrench = jnp.zeros((topology.space.size, n_members, len(stride)))
+    state = State(wrench, problem.rest + zero)
+    none = jnp.zeros(stride.shape, int)
+    outset = jnp.zeros((topology.space.size, topology.n_blocks, len(stride)))
+    return March(state, state, zero, stride, stride, zero, zero, none, none, none, outset)
+
+
+def march(topology: Topology, problem: Problem, start: March, in_steps: Array, most: Array) -> March:
+    """Go on until no point is active, or `most` corrections have been made; a failed attempt ends it unless `in_steps`."""
+
+    def go_on(carry: tuple[March, Array]) -> Array:
+        now, count = carry
+        return jnp.any(now.status == ACTIVE) & (count < most)
+
+    def correct(carry: tuple[March, Array]) -> tuple[March, Array]:
+        now, count = carry
+        state, motion, size = correction(topology, problem, now.state, now.target)
+        outset = jnp.where(now.iterations == 0, motion, now.outset)
+        return _next(now._replace(outset=outset), state, size, in_steps), count + 1
+
+    return jax.lax.while_loop(go_on, correct, (start, jnp.array(0)))[0]
+
+
+def correction(topology: Topology, problem: Problem, state: State, level: Array) -> tuple[State, Array, Array]:
+    """One Newton step, its motion, and its size (n_points,) in lengths and radians."""
+    law, own = flexibility(topology, problem, state.wrench)
+    left = residual(topology, problem, state, level, law)
+    slope = tangent(topology, problem, state, level, own)
+    free = left.force[:, : topology.n_free]
+    taken = step(topology, slope, left.gap[:, None], free[:, None], left.ahead[:, None])
+    motion, relative = taken.motion[:, 0], taken.relative[:, 0]
+    size = jnp.maximum(largest(motion), largest(relative))
+    return State(state.wrench + taken.wrench[:, 0], topology.space.moved(state.pose, motion)), motion, size
+
+
+def largest(values: Array) -> Array:
+    """Largest magnitude of all but the last axis; NaN where one is."""
+    return jnp.max(jnp.abs(values), axis=tuple(range(values.ndim - 1)), initial=0.0)
+
+
+def _next(now: March, state: State, size: Array, in_steps: Array) -> March:
+    """What the last correction means for each point."""
+    active = now.status == ACTIVE
+    tries = now.tries + 1
+    again = tries > 1
+    contraction = size / jnp.where(again, now.size, 1.0)
+    bad = ~jnp.isfinite(size) | (size > MOST) | (again & (contraction > CONTRACTION) & (size > SMALL))
+    there = ~bad & (size < SMALL)
+    bad = bad | (~there & (tries >= PATIENCE))
+    first = jnp.where(tries == 2, contraction, now.first)
+    iterations = now.iterations + active
+    arrived = active & there
+    back = active & bad
+    longer = jnp.where((tries <= 2) | (first < EASE), 2 * now.stride, now.stride)
+    stride = jnp.where(arrived, longer, jnp.where(back, now.stride / 2, now.stride))
+    done = jnp.where(arrived, now.target, now.done)
+    status = jnp.where(arrived & (done >= 1.0), CONVERGED, now.status)
+    status = jnp.where(back & (~in_steps | (stride < SHORTEST)), FAILED, status)
+    anew = arrived | back
+    return now._replace(
+        state=_where(back, now.base, _where(active, state, now.state)),
+        base=_where(arrived, state, now.base),
+        done=done,
+        target=jnp.where(anew, jnp.minimum(1.0, done + stride), now.target),
+        stride=stride,
+        size=size,
+        first=jnp.where(anew, 0.0, first),
+        tries=jnp.where(anew, 0, tries),
+        iterations=iterations,
+        status=status,
+    )
+
+
+def _where(mask: Array, one: State, other: State) -> State:
+    return State(*(jnp.where(mask, a, b) for a, b in zip(one, other, strict=True)))

@@ -1,0 +1,210 @@
+"""Large displacements: condense a frame once, solve many cases.
+
+Every case is tried at one go; where Newton's method does not contract, where the equilibrium is
+unstable, or where no smooth path leads from rest to it, it is tried again in steps along the load.
+What then has no stable equilibrium is reported as such.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Any
+
+import jax
+import numpy as np
+from jax.typing import ArrayLike
+from numpy.typing import NDArray
+
+from . import scaling
+from .arrays import FrameArrays, frame_arrays
+from .blockloads import dead_loads, follower_loads, prescribed
+from .condensed import Problem, topology
+from .equilibria import Equilibria, equilibria, joined
+from .kernel import Kernel, taken
+from .linear import _checked, _checked_motions
+from .mechanisms import check_held
+from .model import MOTIONS, Frame
+from .planar import Planar
+from .planes import check_planar, check_rotations
+from .precision import in_float64
+from .rods import Rods
+from .scaling import Geometry, Units
+from .spatial import Spatial
+
+Floats = NDArray[np.float64]
+
+CHUNK = 256
+"""Cases that are solved together. Fixed, so that one shape is compiled and a case does not depend on its batch."""
+
+N_STEPS = 8
+"""Steps along each member: the error of a displacement is about 1e-5 of it where a member turns by half a radian."""
+
+
+@dataclass(frozen=True, eq=False)
+class NonlinearSolver:
+    """A condensed frame; made by :func:`condense`.
+
+    Parameters
+    ----------
+    frame : Frame
+    arrays : FrameArrays
+    kernel : Kernel
+        What is compiled.
+    units : Units
+        What one means in the kernel's arrays.
+    """
+
+    frame: Frame
+    arrays: FrameArrays
+    kernel: Kernel
+    units: Units
+
+    def solve(
+        self,
+        loads: ArrayLike | None = None,
+        motions: ArrayLike | None = None,
+        followers: ArrayLike | None = None,
+        geometry: Geometry | None = None,
+        only_stable: bool = True,
+    ) -> Equilibria:
+        """Equilibria of all cases; the number of cases is that of whatever is given.
+
+        Parameters
+        ----------
+        loads : array-like, shape (n_cases, n_nodes, 6), optional
+            Loads that keep their direction, N and N m; :func:`.load_array` makes them.
+        motions : array-like, shape (n_cases, n_nodes, 6), optional
+            Translations, m, and rotation vectors, rad, of supported nodes; :func:`.motion_array` makes them.
+        followers : array-like, shape (n_cases, n_nodes, 6), optional
+            Loads that turn with their node, N and N m, in global axes at rest.
+        geometry : Geometry, optional
+            Instead of the frame's, for all cases or for each: the last axes are 1 or n_cases.
+        only_stable : bool
+            Refuse an equilibrium from which the mechanism would snap or buckle away.
+
+        Returns
+        -------
+        Equilibria
+            A case without a stable equilibrium on the way from rest has ``ok`` false and a reason.
+
+        Raises
+        ------
+        ValueError
+            If an array has another shape or is not finite, a motion is prescribed where none is held,
+            or a planar frame is loaded out of its plane.
+        """
+        return joined(list(self.stream(loads, motions, followers, geometry, only_stable)))
+
+    def stream(
+        self,
+        loads: ArrayLike | None = None,
+        motions: ArrayLike | None = None,
+        followers: ArrayLike | None = None,
+        geometry: Geometry | None = None,
+        only_stable: bool = True,
+    ) -> Iterator[Equilibria]:
+        """The same as :meth:`solve`, :data:`CHUNK` cases at a time, so that memory does not grow with their number."""
+        given = self._checked(loads, motions, followers)
+        n_cases = len(given[0])
+        for start in range(0, n_cases, CHUNK):
+            rows = np.arange(start, min(start + CHUNK, n_cases))
+            yield self._solve(*(array[rows] for array in given), taken(geometry, rows), only_stable)
+
+    @in_float64
+    def _solve(
+        self, loads: Floats, motions: Floats, followers: Floats, geometry: Geometry | None, only_stable: bool
+    ) -> Equilibria:
+        """One chunk, filled up with its last case."""
+        n = len(loads)
+        rows = np.minimum(np.arange(CHUNK), n - 1)
+        filled = taken(geometry, rows)
+        problem, centre = self.problem(loads[rows], motions[rows], followers[rows], filled)
+        settled = self.kernel.settle(problem, n, only_stable)
+        return equilibria(
+            self.frame, self.arrays, self.kernel.topology.space, self.units, settled, centre, n, only_stable
+        )
+
+    def problem(
+        self, loads: Floats, motions: Floats, followers: Floats, geometry: Geometry | None = None
+    ) -> tuple[Problem, Any]:
+        """The condensed problem of arrays as in :meth:`solve`, and the centres of the sections at rest; of order one."""
+        a, space, unit = self.arrays, self.kernel.topology.space, self.units
+        rods, rest, centre = self._own if geometry is None else self._condensed(geometry)
+        problem = Problem(
+            rods,
+            rest,
+            dead_loads(a, space, unit, loads),
+            follower_loads(a, space, unit, followers),
+            prescribed(a, space, unit, motions),
+        )
+        return problem, centre
+
+    @cached_property
+    def _condensed(self) -> Any:
+        kernel = self.kernel.topology
+        return jax.jit(partial(scaling.condensed, self.arrays, kernel.space, self.units, kernel.n_steps))
+
+    @cached_property
+    def _own(self) -> tuple[Rods, Any, Any]:
+        """Rods, poses and centres at rest of the frame as it is."""
+        return self._condensed(scaling.geometry(self.arrays))
+
+    def _checked(self, *given: ArrayLike | None) -> tuple[Floats, Floats, Floats]:
+        """Loads, motions and followers of the same number of cases, zero where none are given."""
+        frame = self.frame
+        number = next((len(np.asarray(array)) for array in given if array is not None), 0)
+        none = np.zeros((number, len(frame.nodes), 6))
+        loads, motions, followers = (none if array is None else array for array in given)
+        loads, followers = _checked("loads", frame, loads), _checked("loads", frame, followers)
+        if len(followers) != len(loads):
+            raise ValueError(
+                f"there are {len(loads)} cases of loads and {len(followers)} of followers: give as many of both"
+            )
+        motions = _checked_motions(frame, motions, len(loads))
+        if isinstance(self.kernel.topology.space, Planar):
+            for what, array in (("load", loads), ("follower", followers), ("motion", motions)):
+                _check_in_plane(frame, what, array)
+        return loads, motions, followers
+
+
+@in_float64
+def condense(frame: Frame, *, planar: bool = False, n_steps: int = N_STEPS) -> NonlinearSolver:
+    """Prepare `frame` for :meth:`NonlinearSolver.solve`.
+
+    Parameters
+    ----------
+    frame : Frame
+    planar : bool
+        Move in the xy-plane only: half the unknowns, an eighth of the work. All nodes have the same z
+        and all members their local z along global z.
+    n_steps : int
+        Steps of the integration along each member, an even number; the error falls with its fourth power.
+
+    Raises
+    ------
+    ValueError
+        If a part of the frame is free to move, `n_steps` is not even and positive, or the frame is not
+        what `planar` asks for. In space a support must hold all three rotations or none: to hold one
+        while the others are large has no meaning that does not depend on the path.
+    """
+    if n_steps < 2 or n_steps % 2:
+        raise ValueError(f"n_steps must be an even number from 2 on, got {n_steps}")
+    arrays = frame_arrays(frame)
+    if planar:
+        check_planar(frame, arrays)
+    else:
+        check_held(frame, arrays)
+        check_rotations(frame)
+    space = Planar() if planar else Spatial()
+    return NonlinearSolver(frame, arrays, Kernel(topology(arrays, space, n_steps)), scaling.units(arrays))
+
+
+def _check_in_plane(frame: Frame, what: str, array: Floats) -> None:
+    out = [2, 3, 4]
+    bad = np.argwhere(array[:, :, out])
+    if bad.size:
+        case, node, part = bad[0]
+        raise ValueError(
+            f"{what} case {case} acts out of the plane at node {frame.node_names[node]!r} "
+            f"({MOTIONS[out[part]]!r} is not zero): condense the frame without planar, or leave it zero"
+        )
