@@ -9,16 +9,15 @@ Source: Wittrick and Williams, Q. J. Mech. Appl. Math. 24 (1971), 263–284.
 
 from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from .blocks import inverse, multiply, transpose
+from .blocks import inverse, multiply
 from .condensed import Problem, State, Topology
 from .newton import largest
 from .rods import Along
-from .tangent import Tangent, columns, residual, step, tangent
+from .tangent import Tangent, residual, step, tangent
 
 
 class Conclusion(NamedTuple):
@@ -61,12 +60,10 @@ def conclude(topology: Topology, problem: Problem, state: State, outset: Array) 
     """Conclude on states at the full load; `outset` is the direction at rest, (D, n_blocks, n_points)."""
     space, free = topology.space, slice(topology.n_free)
     level = jnp.ones(state.wrench.shape[-1])
-    (law, met), (change, changes) = columns(
-        topology, lambda wrench: space.law_along(wrench, problem.rods, topology.n_steps), state.wrench
-    )
-    own = jax.vmap(space.spin, in_axes=(None, 1), out_axes=1)(law, change)
+    law, twist, met = space.law(state.wrench, problem.rods, topology.n_steps, trace=True)
+    assert met is not None
     left = residual(topology, problem, state, level, law)
-    slope = tangent(topology, problem, state, level, own)
+    slope = tangent(topology, problem, state, level, twist)
     direction, negative = _direction(topology, problem, state, slope)
     motion = space.towards(state.pose, problem.rest + 0 * state.pose)
     undone = jnp.where(topology.held, 0.0, left.force[:, free])
@@ -80,7 +77,7 @@ def conclude(topology: Topology, problem: Problem, state: State, outset: Array) 
         _centres(topology, state, met),
         _energy(topology, problem, met.internal),
         jnp.maximum(jnp.maximum(largest(left.gap), largest(left.ahead)), missed),
-        negative + _conjugate_points(topology, met.pose[:, 1:], changes.pose[:, :, 1:]),
+        negative + _conjugate_points(met.twist),
         largest(motion - (outset + direction) / 2) / jnp.maximum(largest(motion), 1e-12),
     )
 
@@ -95,13 +92,9 @@ def _direction(topology: Topology, problem: Problem, state: State, slope: Tangen
     return taken.motion[:, 0], taken.negative
 
 
-def _conjugate_points(topology: Topology, pose: Array, change: Array) -> Array:
+def _conjugate_points(twist: Array) -> Array:
     """Unstable modes of the members with both ends held, all together, (n_points,)."""
-    space = topology.space
-    own = jax.vmap(space.spin, in_axes=(None, 1), out_axes=1)(pose, change)
-    # About the section itself the flexibility of a short piece is close to symmetric, so its pivots keep their signs.
-    about = multiply(own, transpose(space.shift(jnp.zeros_like(pose), pose)))
-    _, pivots = inverse(about)
+    _, pivots = inverse(twist)
     odd = jnp.sum(pivots < 0, axis=0) % 2
     before = jnp.concatenate([jnp.zeros_like(odd[:1]), odd[:-1]])
     return jnp.sum(odd != before, axis=(0, 1))

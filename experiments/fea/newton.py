@@ -15,7 +15,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from .condensed import Problem, State, Topology
-from .tangent import flexibility, residual, step, tangent
+from .tangent import residual, step, tangent
 
 ACTIVE, CONVERGED, FAILED = 0, 1, 2
 
@@ -98,9 +98,9 @@ def march(topology: Topology, problem: Problem, start: March, in_steps: Array, m
 
 def correction(topology: Topology, problem: Problem, state: State, level: Array) -> tuple[State, Array, Array]:
     """One Newton step, its motion, and its size (n_points,) in lengths and radians."""
-    law, own = flexibility(topology, problem, state.wrench)
+    law, twist, _ = topology.space.law(state.wrench, problem.rods, topology.n_steps)
     left = residual(topology, problem, state, level, law)
-    slope = tangent(topology, problem, state, level, own)
+    slope = tangent(topology, problem, state, level, twist)
     free = left.force[:, : topology.n_free]
     taken = step(topology, slope, left.gap[:, None], free[:, None], left.ahead[:, None])
     motion, relative = taken.motion[:, 0], taken.relative[:, 0]

@@ -1,4 +1,4 @@
-"""Motions in the xy-plane: a pose is (x, y, θ), a motion (δx, δy, δθ), a wrench (Fx, Fy, Mz).
+"""Motions in the xy-plane: a pose is (x, y, θ, cos θ, sin θ), a motion (δx, δy, δθ), a wrench (Fx, Fy, Mz).
 
 The batch lies in the last axes of every array.
 """
@@ -10,17 +10,17 @@ import numpy as np
 from jax import Array
 
 from .blocks import apply
-from .rods import Along, Components, Rods, even_series, integrate, with_start
+from .rods import Along, Components, Rods, along, even_series, integrate
 
 
 class Planar:
     """The plane as the nonlinear solver sees it; :class:`.spatial.Spatial` has the same methods."""
 
     size: ClassVar[int] = 3
-    n_pose: ClassVar[int] = 3
+    n_pose: ClassVar[int] = 5
     n_translations: ClassVar[int] = 2
     n_dead: ClassVar[int] = 5
-    unturned: ClassVar = np.array([0.0])
+    unturned: ClassVar = np.array([0.0, 1.0, 0.0])
     motions: ClassVar[tuple[int, ...]] = (0, 1, 5)
     """Which of the six motions of a node these are."""
 
@@ -39,7 +39,7 @@ class Planar:
         return m * a2 - k * b2, k * b1 - m * a1, jnp.zeros_like(k)
 
     def screwed(self, pose: Components, screw: Components) -> Components:
-        """The pose (x, y, θ, cos θ, sin θ) after a screw in its own axes."""
+        """The pose after a screw in its own axes."""
         x, y, angle, c, s = pose
         u, v, turn = screw
         square = turn * turn
@@ -54,52 +54,65 @@ class Planar:
             s * c_turn + c * s_turn,
         )
 
-    def law(self, wrench: Array, rods: Rods, n_steps: int) -> Array:
-        """Pose of the end body in the axes of the start body, under the wrench (3, ...) about its origin."""
-        return self._along(wrench, rods, n_steps, trace=False)[0]
+    def carried(self, wrench: Components, twist: Components) -> Components:
+        """Change of a wrench on a body that moves by a twist."""
+        fx, fy, _ = wrench
+        vx, vy, turn = twist
+        return fy * turn, -fx * turn, fx * vy - fy * vx
 
-    def law_along(self, wrench: Array, rods: Rods, n_steps: int) -> tuple[Array, Along]:
-        """The same, and what is met along the members."""
-        law, (internal, pose), (internals, poses) = self._along(wrench, rods, n_steps, trace=True)
-        met = Along(with_start(internal, internals), with_start(pose, poses)[:3])
-        return law, met
-
-    def _along(self, wrench: Array, rods: Rods, n_steps: int, trace: bool) -> tuple:
+    def yielding(self, pose: Components, compliance: Array, wrench: Components) -> Components:
+        """Twist per length about the origin under a wrench about the origin, of a section at `pose`."""
+        x, y, _, c, s = pose
         fx, fy, m = wrench
-        x, y, angle = (part + jnp.zeros_like(fx) for part in rods.start)
-        c, s = jnp.cos(angle), jnp.sin(angle)
+        axial, shear, bending = compliance
+        along, aside = axial * (c * fx + s * fy), shear * (c * fy - s * fx)
+        turn = bending * (m - x * fy + y * fx)
+        return c * along - s * aside + y * turn, s * along + c * aside - x * turn, turn
+
+    def law(self, wrench: Array, rods: Rods, n_steps: int, trace: bool = False) -> tuple[Array, Array, Along | None]:
+        """Where members put their ends under the wrench (3, ...) about the origin of the start body, in its axes.
+
+        Returns
+        -------
+        law : Array, shape (P, ...)
+            Pose of the end body.
+        twist : Array, shape (3, 3, ...)
+            Of it about the origin of the start, per change of the wrench.
+        along : Along, optional
+            With `trace`.
+        """
+        fx, fy, m = wrench
+        x, y, angle, c, s = (part + jnp.zeros_like(fx) for part in rods.start)
         internal = (c * fx + s * fy, c * fy - s * fx, m - x * fy + y * fx)
-        pose = (x, y, angle, c, s)
-        end, met = integrate(self, internal, pose, rods, n_steps, trace)
-        x, y, angle, c, s = end
+        start = (internal, (x, y, angle, c, s))
+        reached, met = integrate(self, tuple(wrench), *start, rods, n_steps, trace)
+        x, y, angle, c, s = reached.pose
         dx, dy, turn = rods.end
-        return jnp.stack([x + c * dx - s * dy, y + s * dx + c * dy, angle + turn]), (internal, pose), met
+        law = jnp.stack([x + c * dx - s * dy, y + s * dx + c * dy, angle + turn])
+        return law, jnp.stack(reached.twist), along(start, met) if trace else None
 
     # --- poses ----------------------------------------------------------------------------------
 
-    def spin(self, pose: Array, change: Array) -> Array:
-        """Motion (δx, δy, δθ) that belongs to a `change` of the numbers of a pose."""
-        return change
-
     def turn(self, pose: Array) -> Array:
         """Matrix that takes motions and wrenches from the axes of a body to the global ones, (3, 3, ...)."""
-        c, s = jnp.cos(pose[2]), jnp.sin(pose[2])
+        c, s = pose[3:]
         o, e = jnp.zeros_like(c), jnp.ones_like(c)
         return jnp.stack([jnp.stack([c, -s, o]), jnp.stack([s, c, o]), jnp.stack([o, o, e])])
 
     def gap(self, start: Array, end: Array, law: Array) -> Array:
         """Motion, in the axes of the start, from where a member's law puts its end body to where that is."""
-        c, s = jnp.cos(start[2]), jnp.sin(start[2])
+        c, s = start[3:]
         dx, dy = end[0] - start[0], end[1] - start[1]
         return jnp.stack([c * dx + s * dy - law[0], c * dy - s * dx - law[1], end[2] - start[2] - law[2]])
 
     def moved(self, pose: Array, motion: Array) -> Array:
         """The pose after a motion in global axes."""
-        return pose + motion
+        x, y, angle = pose[:3] + motion
+        return jnp.stack([x, y, angle, jnp.cos(angle), jnp.sin(angle)])
 
     def towards(self, goal: Array, pose: Array) -> Array:
         """Motion in global axes from `pose` to `goal`."""
-        return goal - pose
+        return (goal - pose)[:3]
 
     # --- matrices of a member, in global axes -----------------------------------------------------
 
@@ -129,7 +142,7 @@ class Planar:
         `load` is (Fx, Fy, Mz, Σ d × f, Σ d · f), with d from the origin to the loaded point at rest.
         """
         fx, fy, m, crossed, dotted = load
-        c, s = jnp.cos(pose[2]), jnp.sin(pose[2])
+        c, s = pose[3:]
         o = jnp.zeros_like(c + m)
         stiffness = s * crossed + c * dotted
         rows = [jnp.stack([o, o, o]), jnp.stack([o, o, o]), jnp.stack([o, o, stiffness + o])]

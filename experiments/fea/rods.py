@@ -8,7 +8,8 @@ What comes out depends on the wrench in the axes of the start alone: turn the me
 answer turns with it.
 
 Sources: Antman, Nonlinear Problems of Elasticity, 2nd ed. (2005), ch. 8 (the equations of the rod);
-Iserles, Munthe-Kaas, Nørsett and Zanna, Acta Numerica 9 (2000), 215–365 (Magnus expansion).
+Iserles, Munthe-Kaas, Nørsett and Zanna, Acta Numerica 9 (2000), 215–365 (Magnus expansion);
+Selig, Geometric Fundamentals of Robotics, 2nd ed. (2005), ch. 12 (compliances that are carried).
 """
 
 import math
@@ -48,18 +49,21 @@ class Rods(NamedTuple):
 
 
 class Along(NamedTuple):
-    """What is met along the members, at the ends of the steps.
+    """What is met along the members.
 
     Parameters
     ----------
     internal : Array, shape (D, n_steps + 1, n_members, n_points)
-        Force and moment that the part beyond a section exerts on it, in the axes of the section.
+        Force and moment that the part beyond a section exerts on it, in the axes of the section; at the ends of steps.
     pose : Array, shape (P, n_steps + 1, n_members, n_points)
         Of the section, in the axes of the body at the start.
+    twist : Array, shape (D, D, n_steps / 2, n_members, n_points)
+        Of the section per change of the wrench, at the end of every second step; see :func:`integrate`.
     """
 
     internal: Array
     pose: Array
+    twist: Array
 
 
 class Section(Protocol):
@@ -77,12 +81,49 @@ class Section(Protocol):
         """The pose after a finite screw in its own axes."""
         ...
 
+    def carried(self, wrench: Components, twist: Components) -> Components:
+        """Change of a wrench on a body that moves by a twist."""
+        ...
+
+    def yielding(self, pose: Components, compliance: Array, wrench: Components) -> Components:
+        """Twist per length about the origin under a wrench about the origin, of a section at `pose`."""
+        ...
+
+
+class Reached(NamedTuple):
+    """End of an integration: pose of the last section, and twist of it, D components of shape (D, n_members, n_points)."""
+
+    pose: Components
+    twist: Components
+
 
 def integrate(
-    section: Section, internal: Components, pose: Components, rods: Rods, n_steps: int, trace: bool
-) -> tuple[Components, Any]:
-    """Pose of the last section from the first's pose and internal wrench; with `trace`, what is met on the way."""
+    section: Section, wrench: Components, internal: Components, pose: Components, rods: Rods, n_steps: int, trace: bool
+) -> tuple[Reached, Any]:
+    """Integrate from the first section to the last; with `trace`, also what is met on the way.
+
+    With the pose comes how it changes with the wrench. That about the origin of the start, W, is the
+    same all along; the twist η of a section about that origin grows by η' = H (δW + P η), where H is
+    the compliance of the section carried to the origin and P η the change of the wrench on a body that
+    moves by η. This is integrated over pairs of steps with the poses that they give: half the work of
+    differentiating the law, and alike up to the error of the law itself.
+
+    Parameters
+    ----------
+    section : Section
+    wrench : Components
+        About the origin of the start body.
+    internal, pose : Components
+        Of the first section.
+    rods : Rods
+    n_steps : int
+        Even.
+    trace : bool
+    """
     h = rods.length / n_steps
+    size = len(wrench)
+    shape = (size, *wrench[0].shape)
+    units = tuple(jnp.zeros(shape).at[i].set(1.0) for i in range(size))
 
     def strains(internal: Components) -> Components:
         return tuple(e + c * x for e, c, x in zip(rods.strain, rods.compliance, internal, strict=True))
@@ -94,20 +135,51 @@ def integrate(
         here, pose = now
         there, middle = _runge_kutta(rates, here, h)
         first, half, last = strains(here), strains(middle), strains(there)
-        twist = section.bracket(first, last)
+        turn = section.bracket(first, last)
         screw = tuple(
-            h / 6 * (a + 4 * b + c) + h * h / 12 * t for a, b, c, t in zip(first, half, last, twist, strict=True)
+            h / 6 * (a + 4 * b + c) + h * h / 12 * t for a, b, c, t in zip(first, half, last, turn, strict=True)
         )
         pose = section.screwed(pose, screw)
-        return (there, pose), ((there, pose) if trace else None)
+        return (there, pose), (there, pose)
 
-    (_, end), met = jax.lax.scan(step, (internal, pose), None, length=n_steps)
-    return end, met
+    def slope(pose: Components, twist: Components) -> Components:
+        change = tuple(u + c for u, c in zip(units, section.carried(wrench, twist), strict=True))
+        return section.yielding(pose, rods.compliance, change)
+
+    def two_steps(now: tuple[Components, Components, Components], _: None) -> tuple[Any, Any]:
+        here, pose, twist = now
+        (there, last), met = jax.lax.scan(step, (here, pose), None, length=2)
+        twist = _runge_kutta_known(slope, twist, (pose, tuple(part[0] for part in met[1]), last), h)
+        return (there, last, twist), ((*met, twist) if trace else None)
+
+    rest = tuple(jnp.zeros(shape) for _ in range(size))
+    (_, pose, twist), met = jax.lax.scan(two_steps, (internal, pose, rest), None, length=n_steps // 2)
+    return Reached(pose, twist), met
 
 
-def with_start(start: Components, met: Components) -> Array:
-    """The components at the ends of the steps with those at the start before them, (n, n_steps + 1, ...)."""
-    return jnp.stack([jnp.concatenate([a[None], b]) for a, b in zip(start, met, strict=True)])
+def _runge_kutta_known(slope: Any, value: Components, poses: tuple[Components, ...], h: Array) -> Components:
+    """`value` two steps on, its slope depending on poses that are known at the ends and in the middle."""
+
+    def ahead(by: Any, slope: Components) -> Components:
+        return tuple(x + by * s for x, s in zip(value, slope, strict=True))
+
+    first, middle, last = poses
+    k1 = slope(first, value)
+    k2 = slope(middle, ahead(h, k1))
+    k3 = slope(middle, ahead(h, k2))
+    k4 = slope(last, ahead(2 * h, k3))
+    return ahead(h / 3, tuple(a + 2 * b + 2 * c + d for a, b, c, d in zip(k1, k2, k3, k4, strict=True)))
+
+
+def along(start: tuple[Components, Components], met: tuple[Components, Components, Components]) -> Along:
+    """What an integration met, with its start."""
+    internal, pose, twist = met
+
+    def joined(first: Components, then: Components) -> Array:
+        pairs = (part.reshape(-1, *part.shape[2:]) for part in then)
+        return jnp.stack([jnp.concatenate([a[None], b]) for a, b in zip(first, pairs, strict=True)])
+
+    return Along(joined(start[0], internal), joined(start[1], pose), jnp.stack(twist).swapaxes(1, 2))
 
 
 def _runge_kutta(rates: Any, here: Components, h: Array) -> tuple[Components, Components]:

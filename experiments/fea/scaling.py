@@ -73,7 +73,6 @@ def condensed(
     shape = member_shapes(arrays, geometry)
     at = jnp.linspace(0.0, 1.0, n_steps + 1)
 
-
     def places(shape: Shapes) -> Array:
         return jax.vmap(lambda s: along(shape, s)[0])(at).T
 
@@ -131,7 +130,11 @@ def _planar(shape, offsets: list[Array], length: Array, give: list[Array], ones:
     end = [c * dx + s * dy, c * dy - s * dx, -(angle + bend)]
     strain = jnp.stack([ones, 0 * ones, bend / length])
     return Rods(
-        _stacked([offsets[0][0], offsets[0][1], angle], ones), _stacked(end, ones), length, _stacked(give, ones), strain
+        _stacked([offsets[0][0], offsets[0][1], angle, jnp.cos(angle), jnp.sin(angle)], ones),
+        _stacked(end, ones),
+        length,
+        _stacked(give, ones),
+        strain,
     )
 
 

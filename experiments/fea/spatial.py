@@ -12,7 +12,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from .blocks import apply, four, skew
-from .rods import Along, Components, Rods, even_series, integrate, with_start
+from .rods import Along, Components, Rods, along, even_series, integrate
 
 
 class Spatial:
@@ -51,32 +51,45 @@ class Spatial:
         turned = product(quaternion, (cosine, *(sine * t / 2 for t in turn)))
         return (*(a + b for a, b in zip(place, step, strict=True)), *turned)
 
-    def law(self, wrench: Array, rods: Rods, n_steps: int) -> Array:
-        """Pose of the end body in the axes of the start body, under the wrench (6, ...) about its origin."""
-        return self._along(wrench, rods, n_steps, trace=False)[0]
+    def carried(self, wrench: Components, twist: Components) -> Components:
+        """Change of a wrench on a body that moves by a twist."""
+        n, m, v, turn = wrench[:3], wrench[3:], twist[:3], twist[3:]
+        return (*_cross(n, turn), *(a + b for a, b in zip(_cross(m, turn), _cross(n, v), strict=True)))
 
-    def law_along(self, wrench: Array, rods: Rods, n_steps: int) -> tuple[Array, Along]:
-        """The same, and what is met along the members."""
-        law, (internal, pose), (internals, poses) = self._along(wrench, rods, n_steps, trace=True)
-        met = Along(with_start(internal, internals), with_start(pose, poses))
-        return law, met
+    def yielding(self, pose: Components, compliance: Array, wrench: Components) -> Components:
+        """Twist per length about the origin under a wrench about the origin, of a section at `pose`."""
+        place, turn = pose[:3], _rows(pose[3:])
+        force, moment = wrench[:3], wrench[3:]
+        moment = tuple(a - b for a, b in zip(moment, _cross(place, force), strict=True))
+        columns = tuple(zip(*turn, strict=True))
+        strain = tuple(c * x for c, x in zip(compliance[:3], _product(columns, force), strict=True))
+        bend = tuple(c * x for c, x in zip(compliance[3:], _product(columns, moment), strict=True))
+        spin = _product(turn, bend)
+        return (*(a + b for a, b in zip(_product(turn, strain), _cross(place, spin), strict=True)), *spin)
 
-    def _along(self, wrench: Array, rods: Rods, n_steps: int, trace: bool) -> tuple:
+    def law(self, wrench: Array, rods: Rods, n_steps: int, trace: bool = False) -> tuple[Array, Array, Along | None]:
+        """Where members put their ends under the wrench (6, ...) about the origin of the start body, in its axes.
+
+        Returns
+        -------
+        law : Array, shape (P, ...)
+            Pose of the end body.
+        twist : Array, shape (6, 6, ...)
+            Of it about the origin of the start, per change of the wrench.
+        along : Along, optional
+            With `trace`.
+        """
         pose = tuple(part + jnp.zeros_like(wrench[0]) for part in rods.start)
-        back = conjugate(pose[3:])
-        force, moment = tuple(wrench[:3]), tuple(wrench[3:])
+        back, force, moment = conjugate(pose[3:]), tuple(wrench[:3]), tuple(wrench[3:])
         moment = tuple(a - b for a, b in zip(moment, _cross(pose[:3], force), strict=True))
-        internal = (*rotated(back, force), *rotated(back, moment))
-        end, met = integrate(self, internal, pose, rods, n_steps, trace)
-        place = tuple(a + b for a, b in zip(end[:3], rotated(end[3:], tuple(rods.end[:3])), strict=True))
-        return jnp.stack([*place, *product(end[3:], tuple(rods.end[3:]))]), (internal, pose), met
+        start = ((*rotated(back, force), *rotated(back, moment)), pose)
+        reached, met = integrate(self, tuple(wrench), *start, rods, n_steps, trace)
+        place, quaternion = reached.pose[:3], reached.pose[3:]
+        place = tuple(a + b for a, b in zip(place, rotated(quaternion, tuple(rods.end[:3])), strict=True))
+        law = jnp.stack([*place, *product(quaternion, tuple(rods.end[3:]))])
+        return law, jnp.stack(reached.twist), along(start, met) if trace else None
 
     # --- poses ----------------------------------------------------------------------------------
-
-    def spin(self, pose: Array, change: Array) -> Array:
-        """Motion, translation and spin, that belongs to a `change` of the numbers of a pose."""
-        twice = product(tuple(change[3:]), conjugate(tuple(pose[3:])))
-        return jnp.stack([*change[:3], *(2 * part for part in twice[1:])])
 
     def turn(self, pose: Array) -> Array:
         """Matrix that takes motions and wrenches from the axes of a body to the global ones, (6, 6, ...)."""
@@ -146,14 +159,22 @@ class Spatial:
 
 def rotation_matrix(q: Array) -> Array:
     """Of a unit quaternion, (4, ...) to (3, 3, ...)."""
+    return jnp.stack([jnp.stack(row) for row in _rows(tuple(q))])
+
+
+def _rows(q: Components) -> tuple[Components, Components, Components]:
+    """Rows of the rotation matrix of a unit quaternion."""
     w, x, y, z = q
-    return jnp.stack(
-        [
-            jnp.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)]),
-            jnp.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)]),
-            jnp.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]),
-        ]
+    return (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
     )
+
+
+def _product(matrix: tuple[Components, ...], vector: Components) -> Components:
+    """Matrix, as rows, times vector."""
+    return tuple(a * vector[0] + b * vector[1] + c * vector[2] for a, b, c in matrix)
 
 
 def quaternion(vector: Array) -> Array:

@@ -7,15 +7,14 @@ left are the bodies, whose stiffness is eliminated block by block. Since wrenche
 stiff direction costs no iterations, as it does where displacements are the only unknowns.
 
 Notation: for a member from A to B with the wrench W = (n, m) on A, X takes a motion of A to that of
-the point B that it would carry, so the wrench on B is −X⁻ᵀ W. The tangent is that of the spatially
+the point B that it would carry, so the wrench on B is −X⁻ᵀ W. With η the flexibility of the member
+about A, δW = η⁻¹ (X⁻¹ (gap + δB) − δA). The tangent is that of the spatially
 parametrised rod (Simo and Vu-Quoc, Comput. Methods Appl. Mech. Engrg. 58 (1986), 79–116, §4),
 condensed to its ends. It is symmetric at an equilibrium under dead forces.
 """
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -48,21 +47,31 @@ class Tangent(NamedTuple):
 
     Parameters
     ----------
-    turn, shift, stiffness : Array, shape (D, D, n_members, n_points)
-        Axes of the start body; X; stiffness of the member about its end, in global axes.
+    turn, back, stiffness : Array, shape (D, D, n_members, n_points)
+        Axes of the start body; X⁻¹; stiffness of the member about its start, in global axes.
     blocks : Array, shape (D, D, n_entries, n_points)
         Stiffness of the bodies, in the order of the plan.
     """
 
     turn: Array
-    shift: Array
+    back: Array
     stiffness: Array
     blocks: Array
 
 
 class Step(NamedTuple):
-    """Motions of all blocks (D, m, n_blocks, n_points), changes of the wrenches in body axes and of the relative motions
-    (D, m, n_members, n_points), m of each, and how many pivots were negative (n_points,).
+    """What is to be changed, in m columns.
+
+    Parameters
+    ----------
+    motion : Array, shape (D, m, n_blocks, n_points)
+        Of the blocks, in global axes.
+    wrench : Array, shape (D, m, n_members, n_points)
+        At the start of the members, in the axes of the body.
+    relative : Array, shape (D, m, n_members, n_points)
+        Motion of the members' ends relative to their starts, about these.
+    negative : Array of int, shape (n_points,)
+        How many pivots were negative.
     """
 
     motion: Array
@@ -72,7 +81,7 @@ class Step(NamedTuple):
 
 
 def residual(topology: Topology, problem: Problem, state: State, level: Array, law: Array) -> Residual:
-    """Residual with loads and prescribed motions times `level`, (n_points,); `law` as from :func:`flexibility`."""
+    """Residual with loads and prescribed motions times `level`, (n_points,); `law` is where the members put their ends."""
     space = topology.space
     start, end = state.pose[:, topology.start], state.pose[:, topology.end]
     turn = space.turn(start)
@@ -88,71 +97,42 @@ def residual(topology: Topology, problem: Problem, state: State, level: Array, l
     return Residual(gap, force, ahead)
 
 
-def tangent(topology: Topology, problem: Problem, state: State, level: Array, own: Array) -> Tangent:
-    """Tangent at a state, which need not be an equilibrium; `own` as from :func:`flexibility`."""
+def tangent(topology: Topology, problem: Problem, state: State, level: Array, twist: Array) -> Tangent:
+    """Tangent at a state, which need not be an equilibrium; `twist` is the flexibility of the members about their starts."""
     space = topology.space
     start, end = state.pose[:, topology.start], state.pose[:, topology.end]
-    turn, shift = space.turn(start), space.shift(start, end)
+    turn, back = space.turn(start), space.shift(end, start)
     wrench = multiply(turn, state.wrench[:, None])[:, 0]
-    own = multiply(multiply(turn, own), transpose(turn))
-    stiffness, _ = inverse(multiply(own, transpose(shift)))
+    stiffness = multiply(multiply(turn, inverse(twist)[0]), transpose(turn))
 
     swing, lever = space.swing(wrench), space.lever(wrench)
-    back = transpose(space.shift(end, start))
-    carried = multiply(stiffness, shift)
+    to_end = multiply(stiffness, back)
     corners = [
-        multiply(transpose(shift), carried) + swing,
-        -multiply(transpose(shift), stiffness),
-        -carried - multiply(back, swing) - lever,
-        stiffness + lever,
+        stiffness + swing,
+        -to_end,
+        -multiply(transpose(back), stiffness + swing) - lever,
+        multiply(transpose(back), to_end) + lever,
     ]
     free = slice(topology.n_free)
     _, dead = space.dead(state.pose[:, free], problem.dead[:, free] * level)
     _, follower = space.follower(state.pose[:, free], problem.follower[:, free] * level)
     blocks = topology.stiffness(jnp.concatenate([*corners, _as_blocks(topology, dead + follower)], axis=2))
-    return Tangent(turn, shift, stiffness, blocks)
-
-
-def flexibility(topology: Topology, problem: Problem, wrench: Array) -> tuple[Array, Array]:
-    """Each member's law, (P, n_members, n_points), and the motion of its end per wrench at its start.
-
-    The latter, (D, D, n_members, n_points), in the axes of the start body.
-    """
-
-    def law(wrench: Array) -> Array:
-        return topology.space.law(wrench, problem.rods, topology.n_steps)
-
-    pose, change = columns(topology, law, wrench)
-    return pose, jax.vmap(topology.space.spin, in_axes=(None, 1), out_axes=1)(pose, change)
-
-
-def columns(topology: Topology, function: Callable[[Array], Any], wrench: Array) -> tuple[Any, Any]:
-    """`function` of the wrenches, and its change per component of them, on a new second axis of every array."""
-
-    def column(direction: Array) -> tuple[Any, Any]:
-        return jax.jvp(function, (wrench,), (jnp.broadcast_to(direction.reshape(-1, 1, 1), wrench.shape),))
-
-    # The value does not depend on the direction, so it is computed once.
-    return jax.vmap(column, out_axes=(None, 1))(jnp.eye(topology.space.size))
+    return Tangent(turn, back, stiffness, blocks)
 
 
 def step(topology: Topology, tangent: Tangent, gap: Array, force: Array, ahead: Array) -> Step:
     """Newton's step for m columns of residuals: gap (D, m, n_members, …), force and ahead (D, m, n_free, …)."""
-    turn, shift, stiffness, blocks = tangent
-    pull = multiply(stiffness, gap)
+    turn, back, stiffness, blocks = tangent
+    pull = multiply(stiffness, multiply(back, gap))
     none = jnp.zeros((*force.shape[:2], topology.n_blocks, force.shape[-1]))
-    right = (
-        force
-        + topology.forces(jnp.concatenate([multiply(transpose(shift), pull), -pull, none], axis=2))[
-            :, :, : topology.n_free
-        ]
-    )
+    pulls = jnp.concatenate([pull, -multiply(transpose(back), pull), none], axis=2)
+    right = force + topology.forces(pulls)[:, :, : topology.n_free]
     if topology.held.any():
         blocks, right = _held(topology, blocks, right, ahead)
     motion, negative = solve(topology.plan, blocks, right)
     motion = jnp.pad(motion, [(0, 0), (0, 0), (0, topology.n_blocks - topology.n_free), (0, 0)])
-    relative = gap + motion[:, :, topology.end] - multiply(shift, motion[:, :, topology.start])
-    wrench = multiply(transpose(turn), multiply(transpose(shift), multiply(stiffness, relative)))
+    relative = multiply(back, gap + motion[:, :, topology.end]) - motion[:, :, topology.start]
+    wrench = multiply(transpose(turn), multiply(stiffness, relative))
     return Step(motion, wrench, relative, negative)
 
 
