@@ -31,26 +31,34 @@ All is computed in float64; the global setting ``jax_enable_x64`` is neither nee
 -0.001905
 """
 
-from .linear import LinearSolver, Solution, factorise, load_array
+from .equilibria import Equilibria
+from .linear import LinearSolver, Solution, factorise, load_array, motion_array
 from .model import Frame, Load, Material, Member, Motion, RigidBody, Support
+from .nonlinear import NonlinearSolver, condense
 from .results import Centreline, centrelines
 from .sections import Section, circle, rectangle
+from .stress import PeakStress
 
 __all__ = [
     "Centreline",
+    "Equilibria",
     "Frame",
     "LinearSolver",
     "Load",
     "Material",
     "Member",
     "Motion",
+    "NonlinearSolver",
+    "PeakStress",
     "RigidBody",
     "Section",
     "Solution",
     "Support",
     "centrelines",
     "circle",
+    "condense",
     "factorise",
     "load_array",
+    "motion_array",
     "rectangle",
 ]

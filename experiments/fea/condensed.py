@@ -84,7 +84,7 @@ class Problem(NamedTuple):
 
 
 class State(NamedTuple):
-    """Wrench at the start of each member, in the axes of its body, (D, n_members, n_points), and poses (P, n_blocks, …)."""
+    """Wrenches at the starts of members in the axes of their bodies, (D, n_members, …), and poses (P, n_blocks, …)."""
 
     wrench: Array
     pose: Array

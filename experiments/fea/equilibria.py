@@ -10,16 +10,13 @@ from scipy.spatial.transform import Rotation
 
 from .arrays import FrameArrays
 from .condensed import Space
-from .kernel import Settled
+from .kernel import EXACT, Settled
 from .model import Frame
 from .results import Centreline
 from .scaling import Units
 from .stress import bending_stress, fibres, normal_stress
 
 Floats = NDArray[np.float64]
-
-EXACT = 1e-8
-"""Residual above which a state is no equilibrium."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,9 +155,7 @@ def equilibria(
     """The first `n` points of what the kernel found, in SI units."""
     found = settled.conclusion
     residual, unstable = found.residual[:n], found.unstable[:n]
-    ok = settled.arrived[:n] & (residual < EXACT)
-    if only_stable:
-        ok &= unstable == 0
+    ok = settled.is_sound(only_stable)[:n]
     reasons = tuple(
         "" if good else _reason(*why)
         for good, *why in zip(ok, settled.arrived, settled.reached, unstable, residual, strict=False)

@@ -156,7 +156,8 @@ class Support:
         for motion in self.motions:
             if motion not in MOTIONS:
                 raise ValueError(
-                    f"support at node {self.node!r} holds an unknown motion {motion!r}: name some of {', '.join(MOTIONS)}"
+                    f"support at node {self.node!r} holds an unknown motion {motion!r}: name some of "
+                    f"{', '.join(MOTIONS)}"
                 )
         if not self.motions or len(set(self.motions)) < len(self.motions):
             raise ValueError(f"support at node {self.node!r} must name motions, each once; got {self.motions!r}")

@@ -81,7 +81,7 @@ def begin(topology: Topology, problem: Problem, stride: Array) -> March:
 
 
 def march(topology: Topology, problem: Problem, start: March, in_steps: Array, most: Array) -> March:
-    """Go on until no point is active, or `most` corrections have been made; a failed attempt ends it unless `in_steps`."""
+    """Go on until no point is active, or `most` corrections are made; unless `in_steps`, the first attempt decides."""
 
     def go_on(carry: tuple[March, Array]) -> Array:
         now, count = carry

@@ -5,7 +5,10 @@ unstable, or where no smooth path leads from rest to it, it is tried again in st
 What then has no stable equilibrium is reported as such.
 """
 
-from collections.abc import Iterator
+import os
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
@@ -29,9 +32,12 @@ from .planes import check_planar, check_rotations
 from .precision import in_float64
 from .rods import Rods
 from .scaling import Geometry, Units
+from .sensitivity import Directions, Read
 from .spatial import Spatial
 
 Floats = NDArray[np.float64]
+Given = tuple[Floats, Floats, Floats]
+"""Loads, motions and followers, each (n_cases, n_nodes, 6)."""
 
 CHUNK = 256
 """Cases that are solved together. Fixed, so that one shape is compiled and a case does not depend on its batch."""
@@ -105,10 +111,57 @@ class NonlinearSolver:
     ) -> Iterator[Equilibria]:
         """The same as :meth:`solve`, :data:`CHUNK` cases at a time, so that memory does not grow with their number."""
         given = self._checked(loads, motions, followers)
-        n_cases = len(given[0])
-        for start in range(0, n_cases, CHUNK):
-            rows = np.arange(start, min(start + CHUNK, n_cases))
-            yield self._solve(*(array[rows] for array in given), taken(geometry, rows), only_stable)
+
+        def solved(rows: NDArray[np.int64]) -> Equilibria:
+            return self._solve(*(array[rows] for array in given), taken(geometry, rows), only_stable)
+
+        yield from in_threads(solved, chunks(len(given[0])))
+
+    def differentiate(
+        self,
+        read: Read,
+        loads: ArrayLike | None = None,
+        motions: ArrayLike | None = None,
+        *,
+        load_directions: ArrayLike,
+        motion_directions: ArrayLike,
+    ) -> Floats:
+        """Derivatives of what is read off equilibria along m directions of the loads and the prescribed motions.
+
+        Parameters
+        ----------
+        read : callable
+            From :class:`.sensitivity.Answer` to responses, (n_responses, n_points); traceable, and the same
+            object in every call, since it is compiled for.
+        loads, motions : array-like, shape (n_cases, n_nodes, 6), optional
+            As for :meth:`solve`.
+        load_directions, motion_directions : array-like, shape (m, n_nodes, 6)
+
+        Returns
+        -------
+        ndarray, shape (n_cases, n_responses, m)
+            NaN where a case has no stable equilibrium.
+        """
+        given = self._checked(loads, motions, None)
+        along = self._checked(load_directions, motion_directions, None)
+        parts = list(in_threads(lambda rows: self._rates(read, given, along, rows), chunks(len(given[0]))))
+        return np.concatenate(parts)
+
+    @in_float64
+    def _rates(self, read: Read, given: Given, along: Given, rows: NDArray[np.int64]) -> Floats:
+        """Of one chunk."""
+        full = rows[np.minimum(np.arange(CHUNK), len(rows) - 1)]
+        problem, _ = self.problem(*(array[full] for array in given))
+        settled = self.kernel.settle(problem, len(rows))
+        a, space, unit = self.arrays, self.kernel.topology.space, self.units
+        directions = Directions(
+            np.moveaxis(dead_loads(a, space, unit, along[0]), -1, 0)[..., None],
+            np.zeros((len(along[0]), space.size, a.n_blocks, 1)),
+            np.moveaxis(prescribed(a, space, unit, along[1]), -1, 0)[..., None],
+        )
+        found = self.kernel.rates(read, unit, problem, settled.state, directions)
+        found[..., ~settled.is_sound(only_stable=True)] = np.nan
+        return found[..., : len(rows)].transpose(2, 0, 1)
 
     @in_float64
     def _solve(
@@ -127,7 +180,7 @@ class NonlinearSolver:
     def problem(
         self, loads: Floats, motions: Floats, followers: Floats, geometry: Geometry | None = None
     ) -> tuple[Problem, Any]:
-        """The condensed problem of arrays as in :meth:`solve`, and the centres of the sections at rest; of order one."""
+        """The condensed problem of arrays as in :meth:`solve`, and the centres of the sections at rest."""
         a, space, unit = self.arrays, self.kernel.topology.space, self.units
         rods, rest, centre = self._own if geometry is None else self._condensed(geometry)
         problem = Problem(
@@ -149,7 +202,7 @@ class NonlinearSolver:
         """Rods, poses and centres at rest of the frame as it is."""
         return self._condensed(scaling.geometry(self.arrays))
 
-    def _checked(self, *given: ArrayLike | None) -> tuple[Floats, Floats, Floats]:
+    def _checked(self, *given: ArrayLike | None) -> Given:
         """Loads, motions and followers of the same number of cases, zero where none are given."""
         frame = self.frame
         number = next((len(np.asarray(array)) for array in given if array is not None), 0)
@@ -197,6 +250,26 @@ def condense(frame: Frame, *, planar: bool = False, n_steps: int = N_STEPS) -> N
         check_rotations(frame)
     space = Planar() if planar else Spatial()
     return NonlinearSolver(frame, arrays, Kernel(topology(arrays, space, n_steps)), scaling.units(arrays))
+
+
+def chunks(n_cases: int) -> list[NDArray[np.int64]]:
+    """The rows of each chunk."""
+    return [np.arange(start, min(start + CHUNK, n_cases)) for start in range(0, n_cases, CHUNK)]
+
+
+def in_threads(function: Callable[[NDArray[np.int64]], Any], parts: list[NDArray[np.int64]]) -> Iterator[Any]:
+    """`function` of each of `parts`, in order, some ahead in other threads: compiled code does not hold the lock."""
+    if not parts:
+        return
+    yield function(parts[0])  # the first compiles
+    n_threads = os.cpu_count() or 1
+    with ThreadPoolExecutor(n_threads) as pool:
+        ahead = deque(pool.submit(function, part) for part in parts[1 : 1 + 2 * n_threads])
+        for part in parts[1 + 2 * n_threads :]:
+            yield ahead.popleft().result()
+            ahead.append(pool.submit(function, part))
+        while ahead:
+            yield ahead.popleft().result()
 
 
 def _check_in_plane(frame: Frame, what: str, array: Floats) -> None:

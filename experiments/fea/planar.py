@@ -17,6 +17,8 @@ class Planar:
     """The plane as the nonlinear solver sees it; :class:`.spatial.Spatial` has the same methods."""
 
     size: ClassVar[int] = 3
+    block: ClassVar[int] = 64
+    """Points that are worked on together: few enough for the cache, enough to fill the vector unit."""
     n_pose: ClassVar[int] = 5
     n_translations: ClassVar[int] = 2
     n_dead: ClassVar[int] = 5
@@ -92,6 +94,10 @@ class Planar:
         return law, jnp.stack(reached.twist), along(start, met) if trace else None
 
     # --- poses ----------------------------------------------------------------------------------
+
+    def spin(self, pose: Array, change: Array) -> Array:
+        """Motion that belongs to a `change` of the numbers of a pose."""
+        return change[:3]
 
     def turn(self, pose: Array) -> Array:
         """Matrix that takes motions and wrenches from the axes of a body to the global ones, (3, 3, ...)."""

@@ -10,7 +10,7 @@ FLAT = 1e-9  # of the size of the frame, or as a sine
 
 
 def check_planar(frame: Frame, arrays: FrameArrays) -> None:
-    """Raise ``ValueError`` unless `frame` lies in a plane of constant z, with its local z upright, and is held in it."""
+    """Raise ``ValueError`` unless `frame` lies in a plane of constant z, has its local z upright, and is held."""
     heights = np.concatenate([arrays.coordinates[:, 2], arrays.through[:, 2]])
     size = np.ptp(arrays.coordinates, axis=0).max()
     if np.ptp(heights) > FLAT * size:

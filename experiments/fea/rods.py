@@ -91,7 +91,7 @@ class Section(Protocol):
 
 
 class Reached(NamedTuple):
-    """End of an integration: pose of the last section, and twist of it, D components of shape (D, n_members, n_points)."""
+    """End of an integration: pose and twist of the last section; D components of the latter of shape (D, …)."""
 
     pose: Components
     twist: Components

@@ -66,7 +66,7 @@ def units(arrays: FrameArrays) -> Units:
 def condensed(
     arrays: FrameArrays, space: Space, unit: Units, n_steps: int, geometry: Geometry
 ) -> tuple[Rods, Array, Array]:
-    """The members; the poses of the blocks at rest, (P, n_blocks, ...); the centres of sections, (3, n_steps + 1, n_members, ...)."""
+    """The members, the poses of blocks (P, n_blocks, …) and the centres of sections (3, n_steps + 1, n_members, …)."""
     masters = arrays.master[[np.flatnonzero(arrays.block == b)[0] for b in range(arrays.n_blocks)]]
     place = jnp.asarray(geometry.coordinates)[:, masters] / unit.length
     unturned = space.unturned.reshape(-1, 1, 1) + 0 * place[:1]

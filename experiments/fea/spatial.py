@@ -19,6 +19,8 @@ class Spatial:
     """Space as the nonlinear solver sees it; :class:`.planar.Planar` has the same methods."""
 
     size: ClassVar[int] = 6
+    block: ClassVar[int] = 16
+    """Points that are worked on together: few enough for the cache, enough to fill the vector unit."""
     n_pose: ClassVar[int] = 7
     n_translations: ClassVar[int] = 3
     n_dead: ClassVar[int] = 15
@@ -90,6 +92,11 @@ class Spatial:
         return law, jnp.stack(reached.twist), along(start, met) if trace else None
 
     # --- poses ----------------------------------------------------------------------------------
+
+    def spin(self, pose: Array, change: Array) -> Array:
+        """Motion, translation and spin, that belongs to a `change` of the numbers of a pose."""
+        twice = product(tuple(change[3:]), conjugate(tuple(pose[3:])))
+        return jnp.stack([*change[:3], *(2 * part for part in twice[1:])])
 
     def turn(self, pose: Array) -> Array:
         """Matrix that takes motions and wrenches from the axes of a body to the global ones, (6, 6, ...)."""

@@ -81,7 +81,7 @@ class Step(NamedTuple):
 
 
 def residual(topology: Topology, problem: Problem, state: State, level: Array, law: Array) -> Residual:
-    """Residual with loads and prescribed motions times `level`, (n_points,); `law` is where the members put their ends."""
+    """Residual with loads and prescribed motions times `level`; `law` is where the members put their ends."""
     space = topology.space
     start, end = state.pose[:, topology.start], state.pose[:, topology.end]
     turn = space.turn(start)
@@ -98,7 +98,7 @@ def residual(topology: Topology, problem: Problem, state: State, level: Array, l
 
 
 def tangent(topology: Topology, problem: Problem, state: State, level: Array, twist: Array) -> Tangent:
-    """Tangent at a state, which need not be an equilibrium; `twist` is the flexibility of the members about their starts."""
+    """Tangent at a state, equilibrium or not; `twist` is the flexibility of the members about their starts."""
     space = topology.space
     start, end = state.pose[:, topology.start], state.pose[:, topology.end]
     turn, back = space.turn(start), space.shift(end, start)

@@ -25,7 +25,11 @@ __all__ = [
     "register",
 ]
 
-_BUILT_IN = {"hexflex": ".hexflex:HexFlex", "cantilever": ".cantilever:Cantilever"}
+_BUILT_IN = {
+    "hexflex": ".hexflex:HexFlex",
+    "flexure_3rrr": ".flexure_3rrr:Flexure3RRR",
+    "cantilever": ".cantilever:Cantilever",
+}
 _REGISTERED: dict[str, type[Oracle]] = {}
 
 

@@ -6,14 +6,29 @@ from functools import cached_property
 from importlib.resources import files
 from typing import Any, ClassVar
 
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
 from numpy.typing import ArrayLike, NDArray
 
 from ..factors import Factor, FactorSpace
-from ..fea import Frame, LinearSolver, Material, Member, RigidBody, centrelines, factorise, rectangle
+from ..fea import (
+    Equilibria,
+    Frame,
+    LinearSolver,
+    Material,
+    Member,
+    RigidBody,
+    centrelines,
+    condense,
+    factorise,
+    rectangle,
+)
+from ..fea.sensitivity import Answer
 from ..runs import Response
 from ..settings import parameter
-from .base import Arrow, JaxOracle, Line, PublishedMap, Shape
+from .base import Answers, Arrow, JaxOracle, Line, PublishedMap, Shape
+from .equilibrium import BATCH, EquilibriumMap, intrinsic_xyz
 
 _DATA = json.loads((files("experiments.oracles") / "data" / "hexflex.json").read_text(encoding="utf-8"))
 _GEOMETRY = _DATA["geometry"]
@@ -26,11 +41,12 @@ D1_DIRECTIONS = np.deg2rad([0.0, 60.0, 120.0])
 """In-plane direction of each tab's D1, parallel to its connection beams, from +x."""
 
 PIVOT = "centroid"
+KINEMATICS = ("linear", "nonlinear")
 
 
 @dataclass(frozen=True)
 class HexFlex(JaxOracle):
-    """Rigid platform with three tabs on six bent connection beams, small displacements.
+    """Rigid platform with three tabs on six bent connection beams.
 
     Each tab carries two mirror-image limbs: from the root on the platform straight along the tab's
     D1, a bend, and on to a clamp. All fields are parameters in SI units and radians.
@@ -38,7 +54,8 @@ class HexFlex(JaxOracle):
     Raises
     ------
     ValueError
-        If a dimension is not positive or the frame cannot be built; see :class:`experiments.fea.Frame`.
+        If a dimension is not positive, the kinematics is unknown, a stress limit is asked of linear
+        kinematics, or the frame cannot be built; see :class:`experiments.fea.Frame`.
 
     Notes
     -----
@@ -47,14 +64,11 @@ class HexFlex(JaxOracle):
     """
 
     name: ClassVar[str] = "hexflex"
-    summary: ClassVar[str] = "HexFlex nano-manipulator, 6 forces to 6 pose components, linear beam FEA"
-    limits: ClassVar[str] = (
-        "Linear finite elements, as in the thesis: the model is as linear as they are. With geometrically nonlinear "
-        "beams at ±1 N the best linear map leaves 19 % of the standard deviation of x and y (default geometry)"
-    )
+    summary: ClassVar[str] = "HexFlex nano-manipulator, 6 forces to 6 pose components, beam FEA, linear or nonlinear"
     source: ClassVar[str] = "Durango et al., thesis chapter 2; geometry identified from Eq. 2.6"
     # Float64 and a frame of condition 1e4: answers agree to about 1e-12; three digits are kept in hand.
     resolution: ClassVar[float] = 1e-9
+    batch: ClassVar[int] = BATCH
 
     length_1: float = parameter(_GEOMETRY["length_1"], "m", "first leg of a limb, along D1")
     length_2: float = parameter(_GEOMETRY["length_2"], "m", "second leg, from the bend to the clamp")
@@ -66,11 +80,38 @@ class HexFlex(JaxOracle):
     load_radius: float = parameter(_GEOMETRY["load_radius"], "m", "load point from the centroid")
     young: float = parameter(_GEOMETRY["young"], "Pa", "Young's modulus, aluminium 7075")
     poisson: float = parameter(_GEOMETRY["poisson"], "1", "Poisson's ratio")
+    kinematics: str = parameter("linear", "", "linear (the thesis's) or nonlinear (large displacements)")
+    n_steps: int = parameter(8, "1", "integration steps along each leg, even; for nonlinear kinematics")
+    stress_limit: float | None = parameter(None, "Pa", "reject points with a larger bending stress; nonlinear only")
 
     def __post_init__(self) -> None:
         for name in ("length_1", "length_2", "width", "thickness", "load_radius", "young"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"oracle 'hexflex': {name} must be positive, got {getattr(self, name)}")
+        if self.kinematics not in KINEMATICS:
+            raise ValueError(
+                f"oracle 'hexflex': kinematics must be one of {', '.join(KINEMATICS)}, got {self.kinematics!r}"
+            )
+        if self.stress_limit is not None and not self.is_nonlinear:
+            raise ValueError("oracle 'hexflex': stress_limit needs kinematics = 'nonlinear'")
+
+    @property
+    def is_nonlinear(self) -> bool:
+        """Whether displacements may be large."""
+        return self.kinematics == "nonlinear"
+
+    @property
+    def limits(self) -> str:
+        """What this model leaves out."""
+        if self.is_nonlinear:
+            return (
+                "Beams of a linear elastic material on a rigid platform; stresses are those of beams, without notches"
+            )
+        return (
+            "Linear finite elements, as in the thesis: the model is as linear as they are. With geometrically "
+            'nonlinear beams (kinematics = "nonlinear") at ±1 N the best linear map leaves 19 % of the standard deviation of x '
+            "and y (default geometry)"
+        )
 
     @property
     def factors(self) -> FactorSpace:
@@ -80,7 +121,7 @@ class HexFlex(JaxOracle):
 
     @property
     def responses(self) -> tuple[Response, ...]:
-        """Pose of the platform's centroid against its pose at rest."""
+        """Pose of the platform's centroid against its pose at rest; large rotations as intrinsic XYZ Euler angles."""
         return (
             *(Response(name, "m", "µm", 1e6) for name in "xyz"),
             *(Response(f"theta_{axis}", "rad", "µrad", 1e6, f"θ{axis}") for axis in "xyz"),
@@ -88,7 +129,7 @@ class HexFlex(JaxOracle):
 
     @property
     def published(self) -> PublishedMap | None:
-        """Eq. 2.6, for the default geometry only: another geometry is another mechanism."""
+        """Eq. 2.6, for the default geometry and linear kinematics only."""
         if self != HexFlex():
             return None
         given = _DATA["published"]
@@ -123,26 +164,34 @@ class HexFlex(JaxOracle):
         return Frame(nodes, tuple(members), (platform,), tuple(clamps))
 
     def prepare(self) -> None:
-        """Factorise the frame."""
-        _ = self._solver, self._unit_loads
+        """Factorise or condense the frame."""
+        _ = self._map if self.is_nonlinear else (self._solver, self._unit_loads)
+
+    def evaluate(self, points: NDArray[np.float64]) -> Answers:
+        """Poses at points, shape (n, 6)."""
+        return self._map.evaluate(points) if self.is_nonlinear else super().evaluate(points)
+
+    def jacobian(self, points: ArrayLike) -> NDArray[np.float64]:
+        """d pose / d force at `points` (n, 6), shape (n, 6, 6), SI."""
+        return self._map.jacobian(points) if self.is_nonlinear else super().jacobian(points)
 
     def respond(self, point: Any) -> Any:
-        """Pose (x, y, z [m], θx, θy, θz [rad]) of the centroid under the six forces [N]."""
-        import jax.numpy as jnp
-
+        """Linear kinematics: pose (x, y, z [m], θx, θy, θz [rad]) of the centroid under the six forces [N]."""
         loads = jnp.einsum("k,knd->nd", point, self._unit_loads)
         return self._solver.displacements(loads)[self.frame.index(PIVOT)]
 
     def shape(self, point: ArrayLike) -> Shape:
         """Connection beams, tabs and force arrows at the forces `point` [N]."""
         point = np.asarray(point, dtype=np.float64)
-        solution = self._solver.solve(np.einsum("k,knd->nd", point, self._unit_loads)[None])
+        loads = np.einsum("k,knd->nd", point, self._unit_loads)[None]
+        solution = self._map.solver.solve(loads) if self.is_nonlinear else self._solver.solve(loads)
+        lines = solution.centrelines() if isinstance(solution, Equilibria) else centrelines(solution)
 
         def moved(*names: str) -> Line:
             rest = np.array([self.frame.nodes[n] for n in names])
             return Line("platform", rest, np.array([solution.at(n)[0, :3] for n in names]), rigid=True)
 
-        beams = [Line(c.member, c.points, c.displacement) for c in centrelines(solution)]
+        beams = [Line(c.member, c.points, c.displacement) for c in lines]
         body = [moved(*self._outline()), *(moved(PIVOT, tab) for tab in TABS)]
         arrows = [
             Arrow(
@@ -173,6 +222,18 @@ class HexFlex(JaxOracle):
     @cached_property
     def _solver(self) -> LinearSolver:
         return factorise(self.frame)
+
+    @cached_property
+    def _map(self) -> EquilibriumMap:
+        solver = condense(self.frame, n_steps=self.n_steps)
+        platform = solver.arrays.block[self.frame.index(PIVOT)]
+
+        def read(answer: Answer) -> Array:
+            place, turn = answer.motion[:3, platform], answer.motion[3:, platform]
+            return jnp.concatenate([place, intrinsic_xyz(turn)])
+
+        none = np.zeros_like(self._unit_loads)
+        return EquilibriumMap(solver, self._unit_loads, none, read, len(self.responses), self.stress_limit)
 
     @property
     def _directions(self) -> NDArray[np.float64]:
