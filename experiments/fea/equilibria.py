@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from .arrays import FrameArrays
-from .condensed import Space
-from .kernel import EXACT, Settled
+from .conclusion import Conclusion
+from .condensed import Problem, Space, State, Topology
+from .kernel import Settled
 from .model import Frame
 from .results import Centreline
 from .scaling import Units
@@ -142,6 +143,11 @@ class Equilibria:
         return int(self.arrays.block[self.frame.index(node)])
 
 
+def everything(topology: Topology, problem: Problem, state: State, found: Conclusion) -> Conclusion:
+    """The view of the solver that :func:`equilibria` reads."""
+    return found
+
+
 def equilibria(
     frame: Frame,
     arrays: FrameArrays,
@@ -149,22 +155,16 @@ def equilibria(
     units: Units,
     settled: Settled,
     rest_centre: Array,
-    n: int,
     only_stable: bool,
 ) -> Equilibria:
-    """The first `n` points of what the kernel found, in SI units."""
-    found = settled.conclusion
-    residual, unstable = found.residual[:n], found.unstable[:n]
-    ok = settled.is_sound(only_stable)[:n]
-    reasons = tuple(
-        "" if good else _reason(*why)
-        for good, *why in zip(ok, settled.arrived, settled.reached, unstable, residual, strict=False)
-    )
+    """What the kernel found, in SI units; the view is :func:`everything`."""
+    found: Conclusion = settled.seen
+    ok = settled.is_sound(only_stable)
     forces = np.repeat([units.force, units.force * units.length], 3)
     motions = np.repeat([units.length, 1.0], 3)
 
     def real(values: Array, scale: Floats) -> Floats:
-        values = np.asarray(values)[..., :n]
+        values = np.asarray(values)
         if len(values) == 6:
             full = values.copy()
         else:
@@ -177,7 +177,7 @@ def equilibria(
     height = arrays.coordinates[0, 2]
 
     def points(values: Array) -> Floats:
-        values = np.array(values)[..., :n] * units.length
+        values = np.array(values) * units.length
         return values if len(values) == 3 else np.concatenate([values, np.full_like(values[:1], height)])
 
     centre = points(found.centre)
@@ -190,12 +190,12 @@ def equilibria(
         real(found.internal, forces),
         centre,
         points(rest_centre),
-        np.where(ok, found.energy[:n] * units.force * units.length, np.nan),
+        np.where(ok, found.energy * units.force * units.length, np.nan),
         ok,
-        reasons,
-        settled.iterations[:n],
-        residual,
-        np.where(settled.arrived[:n], unstable, 0),
+        settled.reasons(only_stable),
+        settled.iterations,
+        settled.residual,
+        settled.unstable,
     )
 
 
@@ -207,15 +207,3 @@ def joined(chunks: list[Equilibria]) -> Equilibria:
     if first.rest_centre.shape[-1] > 1:
         arrays["rest_centre"] = np.concatenate([chunk.rest_centre for chunk in chunks], axis=-1)
     return replace(first, **arrays, reasons=tuple(reason for chunk in chunks for reason in chunk.reasons))
-
-
-def _reason(arrived: bool, reached: float, unstable: int, residual: float) -> str:
-    if not arrived:
-        return (
-            f"no equilibrium was found beyond {reached:.1%} of the load: it snaps, buckles or is out of reach there; "
-            "load it less, or follow the path"
-        )
-    if unstable:
-        modes = "one mode" if unstable == 1 else f"{unstable} modes"
-        return f"the equilibrium at the full load is unstable in {modes}: the mechanism has buckled; load it less"
-    return f"a residual of {residual:.1g} is left, more than {EXACT:g}: its stiffnesses are too uneven for float64"

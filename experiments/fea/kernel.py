@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import jax
@@ -13,9 +13,7 @@ from numpy.typing import NDArray
 
 from .conclusion import Conclusion, conclude
 from .condensed import Problem, State, Topology
-from .newton import CONVERGED, March, begin, march
-from .scaling import Units
-from .sensitivity import Directions, Read, rates
+from .newton import CONVERGED, begin, march
 
 MOST_AT_ONCE, MOST_IN_STEPS = 16, 4000
 """Newton corrections after which a chunk is given up."""
@@ -30,90 +28,96 @@ TURN = 0.5
 """Largest prescribed motion, in lengths and radians, of a first step: turns beyond π would be made the other way."""
 
 
+View = Callable[[Topology, Problem, State, Conclusion], Any]
+"""What is handed out of the compiled part: arrays with the points last, of converged states."""
+
+
 class Settled(NamedTuple):
-    """What became of the points of a chunk; NumPy arrays with the points last.
+    """What became of the points of a chunk; NumPy arrays with the points last, (n_points,) if nothing else is said.
 
     Parameters
     ----------
-    state : State
-    conclusion : Conclusion
-        Of that state, if it is an equilibrium at the full load.
-    arrived : ndarray of bool, shape (n_points,)
+    seen : pytree of ndarray
+        The view, for what it is worth.
+    arrived : ndarray of bool
         Whether Newton's method got to the full load.
-    reached : ndarray, shape (n_points,)
-        Fraction of the load up to which it got.
-    iterations : ndarray of int, shape (n_points,)
-        All corrections that were made.
+    reached, residual, astray : ndarray
+        Fraction of the load up to which it got; see :class:`.conclusion.Conclusion` for the others.
+    unstable, iterations : ndarray of int
+        Unstable modes, and all corrections that were made.
     """
 
-    state: State
-    conclusion: Conclusion
+    seen: Any
     arrived: NDArray[np.bool_]
     reached: NDArray[np.float64]
+    residual: NDArray[np.float64]
+    astray: NDArray[np.float64]
+    unstable: NDArray[np.int64]
     iterations: NDArray[np.int64]
 
     def is_sound(self, only_stable: bool) -> NDArray[np.bool_]:
         """Which points are equilibria, and stable if that is asked for."""
-        sound = self.arrived & (self.conclusion.residual < EXACT)
-        return sound & (self.conclusion.unstable == 0) if only_stable else sound
+        sound = self.arrived & (self.residual < EXACT)
+        return sound & (self.unstable == 0) if only_stable else sound
+
+    def reasons(self, only_stable: bool) -> tuple[str, ...]:
+        """Why a point has no answer; empty where it has."""
+        why = zip(self.is_sound(only_stable), self.arrived, self.reached, self.unstable, self.residual, strict=True)
+        return tuple("" if sound else _reason(*rest, only_stable) for sound, *rest in why)
 
 
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """Compiled functions of one topology and one size of chunk; to be used in a float64 scope."""
+    """Compiled functions of one topology; to be used in a float64 scope."""
 
     topology: Topology
 
-    def settle(self, problem: Problem, n: int, only_stable: bool = True) -> Settled:
-        """Equilibria of the first `n` points: all at one go; what that does not find beyond doubt, in steps."""
+    def settle(self, problem: Problem, view: View, only_stable: bool) -> Settled:
+        """Equilibria of all points: all at one go; what that does not find beyond doubt, in steps."""
         n_points = problem.dead.shape[-1]
-        first = self._tried(problem, np.ones(n_points), False, MOST_AT_ONCE)
-        again = ~first.arrived | (first.conclusion.astray > ASTRAY)
-        if only_stable:
-            again |= first.conclusion.unstable > 0
-        chosen = np.flatnonzero(again[:n])
+        first = self._tried(problem, view, np.ones(n_points), False, MOST_AT_ONCE)
+        chosen = np.flatnonzero(~first.is_sound(only_stable) | (first.astray > ASTRAY))
         if not chosen.size:
             return first
         rows = np.resize(chosen, n_points)
         hard = taken(problem, rows)
         far = np.abs(hard.motion).max(axis=(0, 1), initial=0.0)
         stride = np.minimum(0.5, TURN / np.maximum(far, TURN)) + np.zeros(n_points)
-        second = self._tried(hard, stride, True, MOST_IN_STEPS)
+        second = self._tried(hard, view, stride, True, MOST_IN_STEPS)
         second = second._replace(iterations=first.iterations[rows] + second.iterations)
         return jax.tree.map(lambda a, b: _replaced(a, chosen, b), first, second)
 
-    def _tried(self, problem: Problem, stride: NDArray[np.float64], in_steps: bool, most: int) -> Settled:
-        found, conclusion = self._solve(problem, stride, np.array(in_steps), np.array(most))
-        state, conclusion, done, status, iterations = jax.tree.map(
-            np.asarray, (found.state, conclusion, found.done, found.status, found.iterations)
-        )
-        return Settled(state, conclusion, status == CONVERGED, done, iterations)
-
-    @cached_property
-    def _solve(self) -> Any:
-        def from_rest(problem: Problem, stride: Array, in_steps: Array, most: Array) -> tuple[March, Conclusion]:
-            found = march(self.topology, problem, begin(self.topology, problem, stride), in_steps, most)
-            return found, conclude(self.topology, problem, found.state, found.outset)
-
-        def blockwise(problem: Problem, stride: Array, in_steps: Array, most: Array) -> tuple[March, Conclusion]:
-            return in_blocks(lambda p, s: from_rest(p, s, in_steps, most), self.topology.space.block, problem, stride)
-
-        return jax.jit(blockwise)
-
-    def rates(self, read: Read, units: Units, problem: Problem, state: State, along: Directions) -> NDArray[np.float64]:
-        """:func:`.sensitivity.rates`, compiled once for each `read`."""
-        return np.array(_compiled_rates(self.topology, units, read)(problem, state, along))
+    def _tried(self, problem: Problem, view: View, stride: NDArray[np.float64], in_steps: bool, most: int) -> Settled:
+        found = _compiled(self.topology, view)(problem, stride, np.array(in_steps), np.array(most))
+        return Settled(*jax.tree.map(np.asarray, found))
 
 
-@lru_cache(maxsize=16)
-def _compiled_rates(topology: Topology, units: Units, read: Read) -> Any:
-    def blockwise(problem: Problem, state: State, along: Directions) -> Array:
-        def some(problem: Problem, state: State) -> Array:
-            return rates(topology, units, read, problem, state, along)
+@lru_cache(maxsize=32)
+def _compiled(topology: Topology, view: View) -> Any:
+    def from_rest(problem: Problem, stride: Array, in_steps: Array, most: Array) -> Settled:
+        found = march(topology, problem, begin(topology, problem, stride), in_steps, most)
+        worth = conclude(topology, problem, found.state, found.outset)
+        arrived = found.status == CONVERGED
+        unstable = jnp.where(arrived, worth.unstable, 0)
+        seen = view(topology, problem, found.state, worth)
+        return Settled(seen, arrived, found.done, worth.residual, worth.astray, unstable, found.iterations)
 
-        return in_blocks(some, topology.space.block, problem, state)
+    def blockwise(problem: Problem, stride: Array, in_steps: Array, most: Array) -> Settled:
+        return in_blocks(lambda p, s: from_rest(p, s, in_steps, most), topology.space.block, problem, stride)
 
     return jax.jit(blockwise)
+
+
+def _reason(arrived: bool, reached: float, unstable: int, residual: float, only_stable: bool) -> str:
+    if not arrived:
+        return (
+            f"no equilibrium was found beyond {reached:.1%} of the load: it snaps, buckles or is out of reach there; "
+            "load it less, or follow the path"
+        )
+    if unstable and only_stable:
+        modes = "one mode" if unstable == 1 else f"{unstable} modes"
+        return f"the equilibrium at the full load is unstable in {modes}: the mechanism has buckled; load it less"
+    return f"a residual of {residual:.1g} is left, more than {EXACT:g}: its stiffnesses are too uneven for float64"
 
 
 def in_blocks(function: Callable[..., Any], size: int, *given: Any) -> Any:

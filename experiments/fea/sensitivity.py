@@ -6,13 +6,17 @@ by differentiation of the integration, so the derivatives are those of the answe
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
+from numpy.typing import NDArray
 
 from .blocks import multiply
+from .conclusion import Conclusion
 from .condensed import Problem, State, Topology
 from .scaling import Units
 from .tangent import residual, step, tangent
@@ -44,8 +48,50 @@ class Directions(NamedTuple):
     motion: Array
 
 
+class Reading(NamedTuple):
+    """What was read off a batch of cases.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n_cases, n_values)
+        NaN where a case has no answer.
+    ok : ndarray of bool, shape (n_cases,)
+    reasons : tuple of str
+        Why a case has no answer; empty where it has.
+    """
+
+    values: NDArray[np.float64]
+    ok: NDArray[np.bool_]
+    reasons: tuple[str, ...]
+
+
 Read = Callable[[Answer], Array]
 """From answers to responses, (n_responses, n_points); traceable."""
+
+
+class Frozen:
+    """An array that can be a key: equal where the numbers are."""
+
+    def __init__(self, values: NDArray[np.float64]) -> None:
+        self.values = values
+        self._key = (values.shape, values.tobytes())
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Frozen) and self._key == other._key
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+
+@lru_cache(maxsize=32)
+def differentiating(read: Read, units: Units, *directions: Frozen) -> Any:
+    """The view of the solver that gives the derivatives of what `read` reads along `directions`."""
+    along = Directions(*(part.values for part in directions))
+
+    def view(topology: Topology, problem: Problem, state: State, found: Conclusion) -> Array:
+        return rates(topology, units, read, problem, state, along)
+
+    return view
 
 
 def rates(topology: Topology, units: Units, read: Read, problem: Problem, state: State, along: Directions) -> Array:
@@ -79,13 +125,23 @@ def rates(topology: Topology, units: Units, read: Read, problem: Problem, state:
 
 
 def answers(topology: Topology, units: Units, problem: Problem, state: State) -> Answer:
-    """Answers of equilibria in SI units."""
+    """Answers of equilibria in SI units, as :class:`.conclusion.Conclusion` has them, but traceable from the state."""
     space = topology.space
     law, _, met = space.law(state.wrench, problem.rods, topology.n_steps, trace=True)
     assert met is not None
     force = residual(topology, problem, state, jnp.ones(state.wrench.shape[-1]), law).force
     motion = space.towards(state.pose, problem.rest + 0 * state.pose)
     return in_si(topology, units, motion, force, met.internal)
+
+
+@lru_cache(maxsize=32)
+def reading(read: Read, units: Units) -> Any:
+    """The view of the solver that gives what `read` reads."""
+
+    def view(topology: Topology, problem: Problem, state: State, found: Conclusion) -> Array:
+        return read(in_si(topology, units, found.motion, found.force, found.internal))
+
+    return view
 
 
 def in_si(topology: Topology, units: Units, motion: Array, force: Array, internal: Array) -> Answer:

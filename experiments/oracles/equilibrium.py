@@ -2,18 +2,16 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from numpy.typing import ArrayLike, NDArray
 
 from ..fea import Equilibria, NonlinearSolver
-from ..fea.nonlinear import CHUNK
 from ..fea.sensitivity import Answer, Read
 from ..fea.spatial import quaternion, rotation_matrix
+from ..fea.stress import bending_stress, fibres
 from ..runs import Status
 from .base import Answers
 
@@ -51,15 +49,13 @@ class EquilibriumMap:
 
     def evaluate(self, points: ArrayLike) -> Answers:
         """Responses, a status and a reason for each point, shape (n, n_factors)."""
-        values, status, reasons = [np.empty((0, self.n_responses))], list[Status](), list[str]()
-        for part in self.solver.stream(*self._inputs(points)):
-            with jax.enable_x64(True):
-                answer = Answer(part.motion, part.force, part.internal)
-                values.append(np.asarray(self._compiled_read(_filled(answer)))[:, : len(part)].T)
-            for ok, reason, rejection in zip(part.ok, part.reasons, self._rejections(part), strict=True):
-                status.append(Status.NOT_CONVERGED if not ok else Status.REJECTED if rejection else Status.OK)
-                reasons.append(reason or rejection)
-        return Answers(np.concatenate(values), status, reasons)
+        found = self.solver.read(self._read_with_peak, *self._inputs(points))
+        values, peaks = found.values[:, : self.n_responses], found.values[:, self.n_responses :]
+        status = [Status.OK if ok else Status.NOT_CONVERGED for ok in found.ok]
+        reasons = list(found.reasons)
+        for i in np.flatnonzero(found.ok & (peaks[:, 0] > self.stress_limit)) if self.stress_limit else ():
+            status[i], reasons[i] = Status.REJECTED, self._rejection(*peaks[i])
+        return Answers(values, status, reasons)
 
     def jacobian(self, points: ArrayLike) -> NDArray[np.float64]:
         """d response / d factor, shape (n, n_responses, n_factors), SI; NaN where there is no equilibrium."""
@@ -77,31 +73,32 @@ class EquilibriumMap:
         loads = np.tensordot(points, self.load_directions, 1)
         return loads, np.tensordot(points, self.motion_directions, 1)
 
-    def _rejections(self, found: Equilibria) -> list[str]:
-        if self.stress_limit is None:
-            return [""] * len(found)
-        stress, member, place = found.largest_stress()
-        return [
-            f"bending stress of {s / 1e6:.4g} MPa in {found.frame.members[m].name} at {p:.0%} of its length, more than "
-            f"stress_limit = {self.stress_limit / 1e6:g} MPa"
-            if s > self.stress_limit
-            else ""
-            for s, m, p in zip(stress, member, place, strict=True)
-        ]
+    def _rejection(self, stress: float, member: float, place: float) -> str:
+        name = self.solver.frame.members[int(member)].name
+        return (
+            f"bending stress of {stress / 1e6:.4g} MPa in {name} at {place:.0%} of its length, more than "
+            f"stress_limit = {(self.stress_limit or np.inf) / 1e6:g} MPa"
+        )
 
     @cached_property
-    def _compiled_read(self) -> Any:
-        return jax.jit(self.read)
+    def _read_with_peak(self) -> Read:
+        """The responses and, where there is a limit, the largest stress, its member and its place."""
+        if self.stress_limit is None:
+            return self.read
+        sections = fibres(self.solver.frame.members)
+
+        def read(answer: Answer) -> Array:
+            stress = bending_stress(jnp, answer.internal, sections)
+            n_sections, n_members, n_points = stress.shape
+            flat = stress.reshape(-1, n_points)
+            peak = flat.argmax(axis=0)
+            where = jnp.stack([peak % n_members, peak // n_members / (n_sections - 1)])
+            return jnp.concatenate([self.read(answer), flat.max(axis=0)[None], where])
+
+        return read
 
 
 def intrinsic_xyz(rotation_vector: Array) -> Array:
     """Intrinsic XYZ Euler angles of rotation vectors, (3, n) to (3, n), rad; R = Rx Ry Rz, |θy| < π/2."""
     r = rotation_matrix(quaternion(rotation_vector))
     return jnp.stack([jnp.arctan2(-r[1, 2], r[2, 2]), jnp.arcsin(r[0, 2]), jnp.arctan2(-r[0, 1], r[0, 0])])
-
-
-def _filled(answer: Answer) -> Answer:
-    """To one size of chunk, so that reading is compiled once."""
-    n = answer.motion.shape[-1]
-    rows = np.minimum(np.arange(CHUNK), n - 1)
-    return Answer(*(part[..., rows] for part in answer))
