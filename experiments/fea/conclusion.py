@@ -15,9 +15,8 @@ from jax import Array
 
 from .blocks import inverse, multiply
 from .condensed import Problem, State, Topology
-from .newton import largest
+from .newton import Evaluated, March, largest
 from .rods import Along
-from .tangent import Tangent, residual, step, tangent
 
 
 class Conclusion(NamedTuple):
@@ -56,40 +55,24 @@ class Conclusion(NamedTuple):
     astray: Array
 
 
-def conclude(topology: Topology, problem: Problem, state: State, outset: Array) -> Conclusion:
-    """Conclude on states at the full load; `outset` is the direction at rest, (D, n_blocks, n_points)."""
-    space, free = topology.space, slice(topology.n_free)
-    level = jnp.ones(state.wrench.shape[-1])
-    law, twist, met = space.law(state.wrench, problem.rods, topology.n_steps, trace=True)
-    assert met is not None
-    left = residual(topology, problem, state, level, law)
-    slope = tangent(topology, problem, state, level, twist)
-    direction, negative = _direction(topology, problem, state, slope)
-    motion = space.towards(state.pose, problem.rest + 0 * state.pose)
-    undone = jnp.where(topology.held, 0.0, left.force[:, free])
+def conclude(topology: Topology, problem: Problem, found: March, last: Evaluated) -> Conclusion:
+    """Conclude on the states of a march, at the full load if it arrived, from what was found at them."""
+    space, state, left = topology.space, found.state, last.left
+    motion = space.towards(state.pose, problem.rest + jnp.zeros_like(state.pose))
+    undone = jnp.where(topology.held, 0.0, left.force[:, : topology.n_free])
     wrench = multiply(space.turn(state.pose[:, topology.start]), state.wrench[:, None])
     missed = largest(undone) / jnp.maximum(largest(wrench), jnp.finfo(wrench.dtype).tiny)
     return Conclusion(
         motion,
-        direction,
+        last.direction,
         left.force,
-        met.internal,
-        _centres(topology, state, met),
-        _energy(topology, problem, met.internal),
+        last.met.internal,
+        _centres(topology, state, last.met),
+        _energy(topology, problem, last.met.internal),
         jnp.maximum(jnp.maximum(largest(left.gap), largest(left.ahead)), missed),
-        negative + _conjugate_points(met.twist),
-        largest(motion - (outset + direction) / 2) / jnp.maximum(largest(motion), 1e-12),
+        last.negative + _conjugate_points(last.met.twist),
+        largest(motion - (found.outset + last.direction) / 2) / jnp.maximum(largest(motion), 1e-12),
     )
-
-
-def _direction(topology: Topology, problem: Problem, state: State, slope: Tangent) -> tuple[Array, Array]:
-    """Motion per fraction of the load, and the number of negative pivots."""
-    space, free = topology.space, slice(topology.n_free)
-    dead, _ = space.dead(state.pose[:, free], problem.dead[:, free])
-    follower, _ = space.follower(state.pose[:, free], problem.follower[:, free])
-    ahead = problem.motion + 0 * state.pose[: space.size, free]
-    taken = step(topology, slope, jnp.zeros_like(state.wrench)[:, None], (dead + follower)[:, None], ahead[:, None])
-    return taken.motion[:, 0], taken.negative
 
 
 def _conjugate_points(twist: Array) -> Array:

@@ -95,8 +95,8 @@ class Kernel:
 @lru_cache(maxsize=32)
 def _compiled(topology: Topology, view: View) -> Any:
     def from_rest(problem: Problem, stride: Array, in_steps: Array, most: Array) -> Settled:
-        found = march(topology, problem, begin(topology, problem, stride), in_steps, most)
-        worth = conclude(topology, problem, found.state, found.outset)
+        found, last = march(topology, problem, begin(topology, problem, stride), in_steps, most)
+        worth = conclude(topology, problem, found, last)
         arrived = found.status == CONVERGED
         unstable = jnp.where(arrived, worth.unstable, 0)
         seen = view(topology, problem, found.state, worth)

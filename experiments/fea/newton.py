@@ -15,7 +15,8 @@ import jax.numpy as jnp
 from jax import Array
 
 from .condensed import Problem, State, Topology
-from .tangent import residual, step, tangent
+from .rods import Along
+from .tangent import Residual, Step, residual, step, tangent
 
 ACTIVE, CONVERGED, FAILED = 0, 1, 2
 
@@ -36,6 +37,25 @@ PATIENCE = 12
 
 SHORTEST = 2.0**-14
 """Fraction of the load below which a step is given up."""
+
+
+class Evaluated(NamedTuple):
+    """What was found at a state.
+
+    Parameters
+    ----------
+    left : Residual
+    met : Along
+    direction : Array, shape (D, n_blocks, n_points)
+        Motion per fraction of the load.
+    negative : Array of int, shape (n_points,)
+        Negative pivots of the stiffness of the bodies.
+    """
+
+    left: Residual
+    met: Along
+    direction: Array
+    negative: Array
 
 
 class March(NamedTuple):
@@ -80,32 +100,47 @@ def begin(topology: Topology, problem: Problem, stride: Array) -> March:
     return March(state, state, zero, stride, stride, zero, zero, none, none, none, outset)
 
 
-def march(topology: Topology, problem: Problem, start: March, in_steps: Array, most: Array) -> March:
-    """Go on until no point is active, or `most` corrections are made; unless `in_steps`, the first attempt decides."""
+def march(topology: Topology, problem: Problem, start: March, in_steps: Array, most: Array) -> tuple[March, Evaluated]:
+    """Go on until no point is active, or `most` corrections are made; unless `in_steps`, the first attempt decides.
 
-    def go_on(carry: tuple[March, Array]) -> Array:
-        now, count = carry
-        return jnp.any(now.status == ACTIVE) & (count < most)
+    The last round finds no point active and only evaluates, so that what is handed out belongs to the states.
+    """
 
-    def correct(carry: tuple[March, Array]) -> tuple[March, Array]:
-        now, count = carry
-        state, motion, size = correction(topology, problem, now.state, now.target)
+    def go_on(carry: tuple[March, Evaluated, Array, Array]) -> Array:
+        _, _, count, was_active = carry
+        return was_active & (count <= most)
+
+    def correct(carry: tuple[March, Evaluated, Array, Array]) -> tuple[March, Evaluated, Array, Array]:
+        now, _, count, _ = carry
+        active = jnp.any(now.status == ACTIVE)
+        taken, found = evaluate(topology, problem, now.state, now.target)
+        motion, relative = taken.motion[:, 0], taken.relative[:, 0]
+        moved = State(now.state.wrench + taken.wrench[:, 0], topology.space.moved(now.state.pose, motion))
         outset = jnp.where(now.iterations == 0, motion, now.outset)
-        return _next(now._replace(outset=outset), state, size, in_steps), count + 1
+        size = jnp.maximum(largest(motion), largest(relative))
+        return _next(now._replace(outset=outset), moved, size, in_steps), found, count + 1, active
 
-    return jax.lax.while_loop(go_on, correct, (start, jnp.array(0)))[0]
+    shape = jax.eval_shape(lambda: evaluate(topology, problem, start.state, start.target)[1])
+    nothing = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), shape)
+    return jax.lax.while_loop(go_on, correct, (start, nothing, jnp.array(0), jnp.array(True)))[:2]
 
 
-def correction(topology: Topology, problem: Problem, state: State, level: Array) -> tuple[State, Array, Array]:
-    """One Newton step, its motion, and its size (n_points,) in lengths and radians."""
-    law, twist, _ = topology.space.law(state.wrench, problem.rods, topology.n_steps)
+def evaluate(topology: Topology, problem: Problem, state: State, level: Array) -> tuple[Step, Evaluated]:
+    """A step of two columns, Newton's correction and the change per fraction of the load, and what was found."""
+    space, free = topology.space, slice(topology.n_free)
+    law, twist, met = space.law(state.wrench, problem.rods, topology.n_steps)
     left = residual(topology, problem, state, level, law)
     slope = tangent(topology, problem, state, level, twist)
-    free = left.force[:, : topology.n_free]
-    taken = step(topology, slope, left.gap[:, None], free[:, None], left.ahead[:, None])
-    motion, relative = taken.motion[:, 0], taken.relative[:, 0]
-    size = jnp.maximum(largest(motion), largest(relative))
-    return State(state.wrench + taken.wrench[:, 0], topology.space.moved(state.pose, motion)), motion, size
+    dead, _ = space.dead(state.pose[:, free], problem.dead[:, free])
+    follower, _ = space.follower(state.pose[:, free], problem.follower[:, free])
+    taken = step(
+        topology,
+        slope,
+        jnp.stack([left.gap, jnp.zeros_like(left.gap)], axis=1),
+        jnp.stack([left.force[:, free], dead + follower], axis=1),
+        jnp.stack([left.ahead, problem.motion + jnp.zeros_like(left.ahead)], axis=1),
+    )
+    return taken, Evaluated(left, met, taken.motion[:, 1], taken.negative)
 
 
 def largest(values: Array) -> Array:

@@ -71,7 +71,7 @@ class Planar:
         turn = bending * (m - x * fy + y * fx)
         return c * along - s * aside + y * turn, s * along + c * aside - x * turn, turn
 
-    def law(self, wrench: Array, rods: Rods, n_steps: int, trace: bool = False) -> tuple[Array, Array, Along | None]:
+    def law(self, wrench: Array, rods: Rods, n_steps: int) -> tuple[Array, Array, Along]:
         """Where members put their ends under the wrench (3, ...) about the origin of the start body, in its axes.
 
         Returns
@@ -80,18 +80,17 @@ class Planar:
             Pose of the end body.
         twist : Array, shape (3, 3, ...)
             Of it about the origin of the start, per change of the wrench.
-        along : Along, optional
-            With `trace`.
+        along : Along
         """
         fx, fy, m = wrench
         x, y, angle, c, s = (part + jnp.zeros_like(fx) for part in rods.start)
         internal = (c * fx + s * fy, c * fy - s * fx, m - x * fy + y * fx)
         start = (internal, (x, y, angle, c, s))
-        reached, met = integrate(self, tuple(wrench), *start, rods, n_steps, trace)
+        reached, met = integrate(self, tuple(wrench), *start, rods, n_steps)
         x, y, angle, c, s = reached.pose
         dx, dy, turn = rods.end
         law = jnp.stack([x + c * dx - s * dy, y + s * dx + c * dy, angle + turn])
-        return law, jnp.stack(reached.twist), along(start, met) if trace else None
+        return law, jnp.stack(reached.twist), along(start, met)
 
     # --- poses ----------------------------------------------------------------------------------
 

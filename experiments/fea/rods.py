@@ -98,9 +98,9 @@ class Reached(NamedTuple):
 
 
 def integrate(
-    section: Section, wrench: Components, internal: Components, pose: Components, rods: Rods, n_steps: int, trace: bool
+    section: Section, wrench: Components, internal: Components, pose: Components, rods: Rods, n_steps: int
 ) -> tuple[Reached, Any]:
-    """Integrate from the first section to the last; with `trace`, also what is met on the way.
+    """Integrate from the first section to the last: what is reached, and what is met at the ends of the steps.
 
     With the pose comes how it changes with the wrench. That about the origin of the start, W, is the
     same all along; the twist η of a section about that origin grows by η' = H (δW + P η), where H is
@@ -118,7 +118,6 @@ def integrate(
     rods : Rods
     n_steps : int
         Even.
-    trace : bool
     """
     h = rods.length / n_steps
     size = len(wrench)
@@ -150,7 +149,7 @@ def integrate(
         here, pose, twist = now
         (there, last), met = jax.lax.scan(step, (here, pose), None, length=2)
         twist = _runge_kutta_known(slope, twist, (pose, tuple(part[0] for part in met[1]), last), h)
-        return (there, last, twist), ((*met, twist) if trace else None)
+        return (there, last, twist), (*met, twist)
 
     rest = tuple(jnp.zeros(shape) for _ in range(size))
     (_, pose, twist), met = jax.lax.scan(two_steps, (internal, pose, rest), None, length=n_steps // 2)

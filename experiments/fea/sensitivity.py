@@ -127,8 +127,7 @@ def rates(topology: Topology, units: Units, read: Read, problem: Problem, state:
 def answers(topology: Topology, units: Units, problem: Problem, state: State) -> Answer:
     """Answers of equilibria in SI units, as :class:`.conclusion.Conclusion` has them, but traceable from the state."""
     space = topology.space
-    law, _, met = space.law(state.wrench, problem.rods, topology.n_steps, trace=True)
-    assert met is not None
+    law, _, met = space.law(state.wrench, problem.rods, topology.n_steps)
     force = residual(topology, problem, state, jnp.ones(state.wrench.shape[-1]), law).force
     motion = space.towards(state.pose, problem.rest + 0 * state.pose)
     return in_si(topology, units, motion, force, met.internal)

@@ -69,7 +69,7 @@ class Spatial:
         spin = _product(turn, bend)
         return (*(a + b for a, b in zip(_product(turn, strain), _cross(place, spin), strict=True)), *spin)
 
-    def law(self, wrench: Array, rods: Rods, n_steps: int, trace: bool = False) -> tuple[Array, Array, Along | None]:
+    def law(self, wrench: Array, rods: Rods, n_steps: int) -> tuple[Array, Array, Along]:
         """Where members put their ends under the wrench (6, ...) about the origin of the start body, in its axes.
 
         Returns
@@ -78,18 +78,17 @@ class Spatial:
             Pose of the end body.
         twist : Array, shape (6, 6, ...)
             Of it about the origin of the start, per change of the wrench.
-        along : Along, optional
-            With `trace`.
+        along : Along
         """
         pose = tuple(part + jnp.zeros_like(wrench[0]) for part in rods.start)
         back, force, moment = conjugate(pose[3:]), tuple(wrench[:3]), tuple(wrench[3:])
         moment = tuple(a - b for a, b in zip(moment, _cross(pose[:3], force), strict=True))
         start = ((*rotated(back, force), *rotated(back, moment)), pose)
-        reached, met = integrate(self, tuple(wrench), *start, rods, n_steps, trace)
+        reached, met = integrate(self, tuple(wrench), *start, rods, n_steps)
         place, quaternion = reached.pose[:3], reached.pose[3:]
         place = tuple(a + b for a, b in zip(place, rotated(quaternion, tuple(rods.end[:3])), strict=True))
         law = jnp.stack([*place, *product(quaternion, tuple(rods.end[3:]))])
-        return law, jnp.stack(reached.twist), along(start, met) if trace else None
+        return law, jnp.stack(reached.twist), along(start, met)
 
     # --- poses ----------------------------------------------------------------------------------
 

@@ -109,8 +109,8 @@ class HexFlex(JaxOracle):
             )
         return (
             "Linear finite elements, as in the thesis: the model is as linear as they are. With geometrically "
-            'nonlinear beams (kinematics = "nonlinear") at ±1 N the best linear map leaves 19 % of the standard deviation of x '
-            "and y (default geometry)"
+            'nonlinear beams (kinematics = "nonlinear") at ±1 N the best linear map leaves 19 % of the standard '
+            "deviation of x and y (default geometry)"
         )
 
     @property
