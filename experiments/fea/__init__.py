@@ -31,8 +31,9 @@ All is computed in float64; the global setting ``jax_enable_x64`` is neither nee
 -0.001905
 """
 
-from .equilibria import Equilibria
-from .linear import LinearSolver, Solution, factorise, load_array, motion_array
+from .equilibria import Equilibria, Path
+from .linear import LinearSolver, Solution, factorise
+from .loads import load_array, motion_array
 from .model import Frame, Load, Material, Member, Motion, RigidBody, Support
 from .nonlinear import NonlinearSolver, condense
 from .results import Centreline, centrelines
@@ -49,6 +50,7 @@ __all__ = [
     "Member",
     "Motion",
     "NonlinearSolver",
+    "Path",
     "PeakStress",
     "RigidBody",
     "Section",

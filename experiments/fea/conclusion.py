@@ -15,7 +15,7 @@ from jax import Array
 
 from .blocks import inverse, multiply
 from .condensed import Problem, State, Topology
-from .newton import Evaluated, March, largest
+from .newton import Evaluated, largest
 from .rods import Along
 
 
@@ -55,23 +55,20 @@ class Conclusion(NamedTuple):
     astray: Array
 
 
-def conclude(topology: Topology, problem: Problem, found: March, last: Evaluated) -> Conclusion:
-    """Conclude on the states of a march, at the full load if it arrived, from what was found at them."""
-    space, state, left = topology.space, found.state, last.left
+def conclude(topology: Topology, problem: Problem, state: State, outset: Array, last: Evaluated) -> Conclusion:
+    """Conclude on states from what was found at them; `outset` is the motion per fraction of the load at rest."""
+    space = topology.space
     motion = space.towards(state.pose, problem.rest + jnp.zeros_like(state.pose))
-    undone = jnp.where(topology.held, 0.0, left.force[:, : topology.n_free])
-    wrench = multiply(space.turn(state.pose[:, topology.start]), state.wrench[:, None])
-    missed = largest(undone) / jnp.maximum(largest(wrench), jnp.finfo(wrench.dtype).tiny)
     return Conclusion(
         motion,
         last.direction,
-        left.force,
+        last.left.force,
         last.met.internal,
         _centres(topology, state, last.met),
         _energy(topology, problem, last.met.internal),
-        jnp.maximum(jnp.maximum(largest(left.gap), largest(left.ahead)), missed),
+        last.undone,
         last.negative + _conjugate_points(last.met.twist),
-        largest(motion - (found.outset + last.direction) / 2) / jnp.maximum(largest(motion), 1e-12),
+        largest(motion - (outset + last.direction) / 2) / jnp.maximum(largest(motion), 1e-12),
     )
 
 

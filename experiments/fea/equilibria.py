@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from jax import Array
@@ -30,6 +31,8 @@ class Equilibria:
     ----------
     frame : Frame
     arrays : FrameArrays
+    coordinates : ndarray, shape (3, n_nodes, n_cases or 1)
+        Of the nodes at rest, m.
     motion : ndarray, shape (6, n_blocks, n_cases)
         Translation, m, and rotation vector, rad, of the origin of each block.
     force : ndarray, shape (6, n_blocks, n_cases)
@@ -55,6 +58,7 @@ class Equilibria:
 
     frame: Frame
     arrays: FrameArrays
+    coordinates: Floats
     motion: Floats
     force: Floats
     internal: Floats
@@ -81,10 +85,11 @@ class Equilibria:
         """Translation, m, and rotation vector, rad, of a node, shape (n_cases, 6); ``ValueError`` if it is unknown."""
         i = self.frame.index(node)
         motion = self.motion[:, self._block(node)].T
-        arm = self.arrays.coordinates[i] - self.arrays.coordinates[self.arrays.master[i]]
+        arm = (self.coordinates[:, i] - self.coordinates[:, self.arrays.master[i]]).T
         if not arm.any():
             return motion.copy()
-        carried = self.rotation(node).apply(arm) - arm
+        turn = self.rotation(node)
+        carried = turn.apply(np.broadcast_to(arm, (len(self), 3))) - arm
         return motion + np.hstack([carried, np.zeros_like(carried)])
 
     @cached_property
@@ -143,21 +148,52 @@ class Equilibria:
         return int(self.arrays.block[self.frame.index(node)])
 
 
+@dataclass(frozen=True, eq=False)
+class Path:
+    """Equilibria along a path from rest.
+
+    Parameters
+    ----------
+    level : ndarray, shape (n_points,)
+        Fraction of the load.
+    arc : ndarray, shape (n_points,)
+        Length of the path, in mean lengths of members and radians.
+    equilibria : Equilibria
+        Its cases are the points; ``.unstable`` counts the unstable modes of each.
+    is_limit : ndarray of bool, shape (n_points,)
+        Points at which the load has an extremum along the path.
+    ended : str
+        Why the path ended.
+    """
+
+    level: Floats
+    arc: Floats
+    equilibria: Equilibria
+    is_limit: NDArray[np.bool_]
+    ended: str
+
+    def __len__(self) -> int:
+        return len(self.level)
+
+
 def everything(topology: Topology, problem: Problem, state: State, found: Conclusion) -> Conclusion:
     """The view of the solver that :func:`equilibria` reads."""
     return found
 
 
-def equilibria(
-    frame: Frame,
-    arrays: FrameArrays,
-    space: Space,
-    units: Units,
-    settled: Settled,
-    rest_centre: Array,
-    only_stable: bool,
-) -> Equilibria:
+class Described(NamedTuple):
+    """What was solved; the coordinates at rest, m, have the shape (3, n_nodes, n_points or 1)."""
+
+    frame: Frame
+    arrays: FrameArrays
+    space: Space
+    units: Units
+    coordinates: Floats
+
+
+def equilibria(what: Described, settled: Settled, rest_centre: Array, only_stable: bool) -> Equilibria:
     """What the kernel found, in SI units; the view is :func:`everything`."""
+    frame, arrays, space, units, coordinates = what
     found: Conclusion = settled.seen
     ok = settled.is_sound(only_stable)
     forces = np.repeat([units.force, units.force * units.length], 3)
@@ -174,17 +210,18 @@ def equilibria(
         full[..., ~ok] = np.nan
         return full
 
-    height = arrays.coordinates[0, 2]
+    height = coordinates[2, 0]
 
     def points(values: Array) -> Floats:
         values = np.array(values) * units.length
-        return values if len(values) == 3 else np.concatenate([values, np.full_like(values[:1], height)])
+        return values if len(values) == 3 else np.concatenate([values, np.zeros_like(values[:1]) + height])
 
     centre = points(found.centre)
     centre[..., ~ok] = np.nan
     return Equilibria(
         frame,
         arrays,
+        coordinates,
         real(found.motion, motions),
         real(found.force, forces),
         real(found.internal, forces),
@@ -204,6 +241,7 @@ def joined(chunks: list[Equilibria]) -> Equilibria:
     first = chunks[0]
     last_axis = ("motion", "force", "internal", "centre", "energy", "ok", "iterations", "residual", "unstable")
     arrays = {name: np.concatenate([getattr(chunk, name) for chunk in chunks], axis=-1) for name in last_axis}
-    if first.rest_centre.shape[-1] > 1:
-        arrays["rest_centre"] = np.concatenate([chunk.rest_centre for chunk in chunks], axis=-1)
+    for name in ("rest_centre", "coordinates"):
+        if getattr(first, name).shape[-1] > 1:
+            arrays[name] = np.concatenate([getattr(chunk, name) for chunk in chunks], axis=-1)
     return replace(first, **arrays, reasons=tuple(reason for chunk in chunks for reason in chunk.reasons))

@@ -13,16 +13,13 @@ from numpy.typing import NDArray
 
 from .conclusion import Conclusion, conclude
 from .condensed import Problem, State, Topology
-from .newton import CONVERGED, begin, march
+from .newton import CONVERGED, EXACT, begin, march
 
 MOST_AT_ONCE, MOST_IN_STEPS = 16, 4000
 """Newton corrections after which a chunk is given up."""
 
 ASTRAY = 0.25
 """A state found at one go this far, relatively, from where a smooth path would lead is looked for again in steps."""
-
-EXACT = 1e-8
-"""Residual above which a state is no equilibrium."""
 
 TURN = 0.5
 """Largest prescribed motion, in lengths and radians, of a first step: turns beyond π would be made the other way."""
@@ -96,7 +93,7 @@ class Kernel:
 def _compiled(topology: Topology, view: View) -> Any:
     def from_rest(problem: Problem, stride: Array, in_steps: Array, most: Array) -> Settled:
         found, last = march(topology, problem, begin(topology, problem, stride), in_steps, most)
-        worth = conclude(topology, problem, found, last)
+        worth = conclude(topology, problem, found.state, found.outset, last)
         arrived = found.status == CONVERGED
         unstable = jnp.where(arrived, worth.unstable, 0)
         seen = view(topology, problem, found.state, worth)

@@ -1,6 +1,5 @@
 """Small displacements: factorise a frame once, solve many load cases."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import jax
@@ -14,8 +13,9 @@ from scipy.linalg import get_lapack_funcs
 
 from . import assembly
 from .arrays import FrameArrays, frame_arrays
+from .loads import checked, checked_motions, shape_sentence
 from .mechanisms import check_finite, check_held, check_resolved
-from .model import MOTIONS, Frame, Load, Motion
+from .model import Frame
 from .precision import check_float64_scope, in_float64
 from .stress import PeakStress, peak_stress
 
@@ -112,8 +112,8 @@ class LinearSolver:
             If an array has another shape or is not finite, or a motion is prescribed that no support holds.
         """
         frame = self.frame
-        loads = _checked("loads", frame, loads)
-        moved = None if motions is None else _checked_motions(frame, motions, len(loads))
+        loads = checked("loads", frame, loads)
+        moved = None if motions is None else checked_motions(frame, motions, len(loads))
         u = self._moved(loads, moved)
         reactions = np.asarray(_reactions(self.stiffness, self.holding, loads, u))
         forces = _end_forces(self.recovery, self.arrays.ends, u)
@@ -144,7 +144,7 @@ class LinearSolver:
         given = [jnp.asarray(x, jnp.float64) for x in (loads, motions) if x is not None]
         for what, x in zip(("loads", "motions"), given, strict=False):
             if x.shape[-2:] != (len(self.frame.nodes), 6):
-                raise ValueError(_shape_sentence(what, self.frame, x.shape))
+                raise ValueError(shape_sentence(what, self.frame, x.shape))
         return self._moved(*jnp.broadcast_arrays(*given))
 
     def _moved(self, loads: Array | NDArray[np.float64], motions: Array | NDArray[np.float64] | None = None) -> Array:
@@ -178,41 +178,6 @@ def factorise(frame: Frame) -> LinearSolver:
     check_resolved(frame, condition, scaled, scale, kinematics)
     holding = _frozen(holding.reshape(len(stiffness), -1))
     return LinearSolver(frame, a, stiffness, recovery, kinematics, holding, _frozen(scale), _frozen(factor), condition)
-
-
-def load_array(frame: Frame, cases: Iterable[Iterable[Load]]) -> NDArray[np.float64]:
-    """Load cases as an array, shape (n_cases, n_nodes, 6), N and N m; loads on the same node add up.
-
-    Raises
-    ------
-    ValueError
-        If a load names an unknown node.
-    """
-    cases = [tuple(case) for case in cases]
-    loads = np.zeros((len(cases), len(frame.nodes), 6))
-    for row, case in zip(loads, cases, strict=True):
-        for load in case:
-            row[frame.index(load.node)] += (*load.force, *load.moment)
-    return loads
-
-
-def motion_array(frame: Frame, cases: Iterable[Iterable[Motion]]) -> NDArray[np.float64]:
-    """Prescribed motions as an array, shape (n_cases, n_nodes, 6), m and rad.
-
-    Raises
-    ------
-    ValueError
-        If a motion names an unknown node, or one case has two of the same node: large rotations do not add up.
-    """
-    cases = [tuple(case) for case in cases]
-    motions = np.zeros((len(cases), len(frame.nodes), 6))
-    for number, case in enumerate(cases):
-        names = [motion.node for motion in case]
-        for motion in case:
-            if names.count(motion.node) > 1:
-                raise ValueError(f"motion case {number} moves node {motion.node!r} twice: give it one motion")
-            motions[number, frame.index(motion.node)] = (*motion.translation, *motion.rotation)
-    return motions
 
 
 dpotrf, dpocon = get_lapack_funcs(("potrf", "pocon"), dtype=np.float64)
@@ -252,43 +217,6 @@ def _cholesky(scaled: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
     if broke_down:
         return factor, 0.0
     return factor, float(dpocon(factor, np.abs(scaled).sum(axis=0).max(), uplo="L")[0])
-
-
-def _checked(what: str, frame: Frame, values: ArrayLike) -> NDArray[np.float64]:
-    """Loads or motions as float64; ``ValueError`` if their shape is another or one is not finite."""
-    values = np.array(values, dtype=np.float64)
-    if values.ndim != 3 or values.shape[1:] != (len(frame.nodes), 6):
-        raise ValueError(_shape_sentence(what, frame, values.shape))
-    bad = np.argwhere(~np.isfinite(values))
-    if bad.size:
-        case, node, _ = bad[0]
-        of = {"loads": "load case {} on", "motions": "motion case {} of"}[what].format(case)
-        raise ValueError(f"{of} node {frame.node_names[node]!r} is not finite: give finite {what}")
-    return values
-
-
-def _checked_motions(frame: Frame, motions: ArrayLike, n_cases: int) -> NDArray[np.float64]:
-    motions = _checked("motions", frame, motions)
-    if len(motions) != n_cases:
-        raise ValueError(f"there are {n_cases} load cases and {len(motions)} motion cases: give as many of both")
-    held = np.zeros(motions.shape[1:], dtype=bool)
-    for support in frame.supports:
-        held[frame.index(support.node)] = support.held
-    bad = np.argwhere((motions != 0) & ~held)
-    if bad.size:
-        case, node, motion = bad[0]
-        name = frame.node_names[node]
-        why = "a clamp keeps at rest: make it a support" if name in frame.clamps else "no support holds: support it"
-        raise ValueError(
-            f"motion case {case} moves node {name!r} in {MOTIONS[motion]!r}, which {why} that holds "
-            f"{MOTIONS[motion]!r}, or leave this motion zero"
-        )
-    return motions
-
-
-def _shape_sentence(what: str, frame: Frame, shape: tuple[int, ...]) -> str:
-    each = {"loads": "three forces and three moments", "motions": "three translations and three rotations"}[what]
-    return f"{what} must have shape (n_cases, {len(frame.nodes)}, 6), {each} a node; got shape {shape}"
 
 
 def _frozen(array: ArrayLike) -> NDArray[np.float64]:

@@ -21,7 +21,10 @@ from .tangent import Residual, Step, residual, step, tangent
 ACTIVE, CONVERGED, FAILED = 0, 1, 2
 
 SMALL = 1e-6
-"""Largest correction, in lengths and radians, after which a point counts as converged: the next is its square."""
+"""Largest correction, in lengths and radians, after which the next is believed to be smaller still."""
+
+AIM, EXACT = 1e-10, 1e-8
+"""What may be left undone; and, where rounding does not let it become that small, what must not be exceeded."""
 
 CONTRACTION = 0.5
 """Corrections that shrink less than this end the attempt."""
@@ -50,12 +53,15 @@ class Evaluated(NamedTuple):
         Motion per fraction of the load.
     negative : Array of int, shape (n_points,)
         Negative pivots of the stiffness of the bodies.
+    undone : Array, shape (n_points,)
+        Largest gap in lengths and radians, or force over the largest in a member, that is left.
     """
 
     left: Residual
     met: Along
     direction: Array
     negative: Array
+    undone: Array
 
 
 class March(NamedTuple):
@@ -103,26 +109,26 @@ def begin(topology: Topology, problem: Problem, stride: Array) -> March:
 def march(topology: Topology, problem: Problem, start: March, in_steps: Array, most: Array) -> tuple[March, Evaluated]:
     """Go on until no point is active, or `most` corrections are made; unless `in_steps`, the first attempt decides.
 
-    The last round finds no point active and only evaluates, so that what is handed out belongs to the states.
+    A point is done when what an evaluation finds undone is small enough, and is left as it is, so that
+    what the last evaluation found belongs to the states that are handed out.
     """
 
-    def go_on(carry: tuple[March, Evaluated, Array, Array]) -> Array:
-        _, _, count, was_active = carry
-        return was_active & (count <= most)
+    def go_on(carry: tuple[March, Evaluated, Array]) -> Array:
+        now, _, count = carry
+        return jnp.any(now.status == ACTIVE) & (count < most)
 
-    def correct(carry: tuple[March, Evaluated, Array, Array]) -> tuple[March, Evaluated, Array, Array]:
-        now, _, count, _ = carry
-        active = jnp.any(now.status == ACTIVE)
+    def correct(carry: tuple[March, Evaluated, Array]) -> tuple[March, Evaluated, Array]:
+        now, _, count = carry
         taken, found = evaluate(topology, problem, now.state, now.target)
         motion, relative = taken.motion[:, 0], taken.relative[:, 0]
         moved = State(now.state.wrench + taken.wrench[:, 0], topology.space.moved(now.state.pose, motion))
         outset = jnp.where(now.iterations == 0, motion, now.outset)
         size = jnp.maximum(largest(motion), largest(relative))
-        return _next(now._replace(outset=outset), moved, size, in_steps), found, count + 1, active
+        return _next(now._replace(outset=outset), moved, size, found.undone, in_steps), found, count + 1
 
     shape = jax.eval_shape(lambda: evaluate(topology, problem, start.state, start.target)[1])
     nothing = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), shape)
-    return jax.lax.while_loop(go_on, correct, (start, nothing, jnp.array(0), jnp.array(True)))[:2]
+    return jax.lax.while_loop(go_on, correct, (start, nothing, jnp.array(0)))[:2]
 
 
 def evaluate(topology: Topology, problem: Problem, state: State, level: Array) -> tuple[Step, Evaluated]:
@@ -140,7 +146,14 @@ def evaluate(topology: Topology, problem: Problem, state: State, level: Array) -
         jnp.stack([left.force[:, free], dead + follower], axis=1),
         jnp.stack([left.ahead, problem.motion + jnp.zeros_like(left.ahead)], axis=1),
     )
-    return taken, Evaluated(left, met, taken.motion[:, 1], taken.negative)
+    return taken, Evaluated(left, met, taken.motion[:, 1], taken.negative, _undone(topology, state, left))
+
+
+def _undone(topology: Topology, state: State, left: Residual) -> Array:
+    force = jnp.where(topology.held, 0.0, left.force[:, : topology.n_free])
+    tiny = jnp.finfo(force.dtype).tiny
+    missed = largest(force) / jnp.maximum(largest(state.wrench), tiny)
+    return jnp.maximum(jnp.maximum(largest(left.gap), largest(left.ahead)), missed)
 
 
 def largest(values: Array) -> Array:
@@ -148,35 +161,37 @@ def largest(values: Array) -> Array:
     return jnp.max(jnp.abs(values), axis=tuple(range(values.ndim - 1)), initial=0.0)
 
 
-def _next(now: March, state: State, size: Array, in_steps: Array) -> March:
-    """What the last correction means for each point."""
+def _next(now: March, state: State, size: Array, undone: Array, in_steps: Array) -> March:
+    """What an evaluation, and the correction that it gives, mean for each point."""
     active = now.status == ACTIVE
+    exact = (undone < AIM) | ((undone < EXACT) & (now.tries >= PATIENCE))
+    final = active & (now.target >= 1.0) & (now.tries > 0) & (now.size < SMALL) & exact
     tries = now.tries + 1
     again = tries > 1
     contraction = size / jnp.where(again, now.size, 1.0)
-    bad = ~jnp.isfinite(size) | (size > MOST) | (again & (contraction > CONTRACTION) & (size > SMALL))
-    there = ~bad & (size < SMALL)
-    bad = bad | (~there & (tries >= PATIENCE))
     first = jnp.where(tries == 2, contraction, now.first)
-    iterations = now.iterations + active
-    arrived = active & there
-    back = active & bad
+    bad = ~jnp.isfinite(size) | (size > MOST) | (again & (contraction > CONTRACTION) & (size > SMALL))
+    between = active & ~bad & (size < SMALL) & (now.target < 1.0)
+    back = active & ~final & ~between & (bad | (tries > PATIENCE))
+    arrived = final | between
+    state = _where(active & ~final, state, now.state)
+
     longer = jnp.where((tries <= 2) | (first < EASE), 2 * now.stride, now.stride)
-    stride = jnp.where(arrived, longer, jnp.where(back, now.stride / 2, now.stride))
+    stride = jnp.where(between, longer, jnp.where(back, now.stride / 2, now.stride))
     done = jnp.where(arrived, now.target, now.done)
-    status = jnp.where(arrived & (done >= 1.0), CONVERGED, now.status)
+    status = jnp.where(final, CONVERGED, now.status)
     status = jnp.where(back & (~in_steps | (stride < SHORTEST)), FAILED, status)
-    anew = arrived | back
+    anew = between | back
     return now._replace(
-        state=_where(back, now.base, _where(active, state, now.state)),
-        base=_where(arrived, state, now.base),
+        state=_where(back, now.base, state),
+        base=_where(between, state, now.base),
         done=done,
         target=jnp.where(anew, jnp.minimum(1.0, done + stride), now.target),
         stride=stride,
         size=size,
         first=jnp.where(anew, 0.0, first),
         tries=jnp.where(anew, 0, tries),
-        iterations=iterations,
+        iterations=now.iterations + (active & ~final),
         status=status,
     )
 

@@ -22,11 +22,12 @@ from . import scaling
 from .arrays import FrameArrays, frame_arrays
 from .blockloads import dead_loads, follower_loads, prescribed
 from .condensed import Problem, topology
-from .equilibria import Equilibria, equilibria, everything, joined
+from .equilibria import Described, Equilibria, Path, equilibria, everything, joined
 from .kernel import Kernel, Settled, View, taken
-from .linear import _checked, _checked_motions
+from .loads import checked, checked_motions
 from .mechanisms import check_held
 from .model import MOTIONS, Frame
+from .path import Follower, gathered
 from .planar import Planar
 from .planes import check_planar, check_rotations
 from .precision import in_float64
@@ -114,8 +115,8 @@ class NonlinearSolver:
 
         def solved(rows: NDArray[np.int64]) -> Equilibria:
             settled, centre = self._settled(everything, given, geometry, rows, only_stable)
-            space = self.kernel.topology.space
-            return equilibria(self.frame, self.arrays, space, self.units, settled, centre, only_stable)
+            coordinates = None if geometry is None else taken(geometry.coordinates, rows)
+            return equilibria(self._described(coordinates), settled, centre, only_stable)
 
         yield from in_threads(solved, chunks(len(given[0])))
 
@@ -173,7 +174,7 @@ class NonlinearSolver:
         toward = self._checked(load_directions, motion_directions, None)
         a, space, unit = self.arrays, self.kernel.topology.space, self.units
         directions = Directions(
-            np.moveaxis(dead_loads(a, space, unit, toward[0]), -1, 0)[..., None],
+            np.moveaxis(dead_loads(a, space, unit, a.coordinates.T[..., None], toward[0]), -1, 0)[..., None],
             np.zeros((len(toward[0]), space.size, a.n_blocks, 1)),
             np.moveaxis(prescribed(a, space, unit, toward[1]), -1, 0)[..., None],
         )
@@ -184,6 +185,52 @@ class NonlinearSolver:
             return np.where(settled.is_sound(only_stable=True), settled.seen, np.nan).transpose(2, 0, 1)
 
         return np.concatenate(list(in_threads(solved, chunks(len(given[0])))))
+
+    @in_float64
+    def follow(
+        self,
+        loads: ArrayLike | None = None,
+        motions: ArrayLike | None = None,
+        followers: ArrayLike | None = None,
+        *,
+        step: float = 0.1,
+        most: int = 200,
+        levels: tuple[float, float] = (-np.inf, np.inf),
+    ) -> Path:
+        """The equilibrium path of one case from rest, through limit points, unstable branches included.
+
+        Parameters
+        ----------
+        loads, motions, followers : array-like, shape (1, n_nodes, 6), optional
+            As for :meth:`solve`; the level 1 is this much.
+        step : float
+            Largest arc length between points: motions of all bodies, in mean lengths of members and radians.
+        most : int
+            Points after which the path ends.
+        levels : tuple of 2 float
+            Fractions of the load at which it ends.
+
+        Raises
+        ------
+        ValueError
+            If there is more than one case, or a setting is out of its range.
+        """
+        given = self._checked(loads, motions, followers)
+        if len(given[0]) != 1:
+            raise ValueError(f"a path is that of one case, got {len(given[0])}: follow them one by one")
+        problem, centre = self.problem(*given)
+        points, why = Follower(step, most, levels).follow(self.kernel.topology, problem)
+        worth, iterations = gathered(points)
+        true = np.ones(len(points), dtype=bool)
+        level = np.array([point.level for point in points])
+        settled = Settled(worth, true, level, worth.residual, worth.astray, worth.unstable, iterations)
+        found = equilibria(self._described(None), settled, centre, False)
+        arc = np.array([point.arc for point in points])
+        return Path(level, arc, found, np.array([point.is_limit for point in points]), why)
+
+    def _described(self, coordinates: Any) -> Described:
+        own = self.arrays.coordinates.T[..., None] if coordinates is None else np.asarray(coordinates)
+        return Described(self.frame, self.arrays, self.kernel.topology.space, self.units, own)
 
     @in_float64
     def _settled(
@@ -201,11 +248,12 @@ class NonlinearSolver:
         """The condensed problem of arrays as in :meth:`solve`, and the centres of the sections at rest."""
         a, space, unit = self.arrays, self.kernel.topology.space, self.units
         rods, rest, centre = self._own if geometry is None else self._condensed(geometry)
+        coordinates = a.coordinates.T[..., None] if geometry is None else np.asarray(geometry.coordinates)
         problem = Problem(
             rods,
             rest,
-            dead_loads(a, space, unit, loads),
-            follower_loads(a, space, unit, followers),
+            dead_loads(a, space, unit, coordinates, loads),
+            follower_loads(a, space, unit, coordinates, followers),
             prescribed(a, space, unit, motions),
         )
         return problem, centre
@@ -228,12 +276,12 @@ class NonlinearSolver:
         if not number:
             raise ValueError("there is nothing to solve: give loads, motions or followers of at least one case")
         loads, motions, followers = (none if array is None else array for array in given)
-        loads, followers = _checked("loads", frame, loads), _checked("loads", frame, followers)
+        loads, followers = checked("loads", frame, loads), checked("loads", frame, followers)
         if len(followers) != len(loads):
             raise ValueError(
                 f"there are {len(loads)} cases of loads and {len(followers)} of followers: give as many of both"
             )
-        motions = _checked_motions(frame, motions, len(loads))
+        motions = checked_motions(frame, motions, len(loads))
         if isinstance(self.kernel.topology.space, Planar):
             for what, array in (("load", loads), ("follower", followers), ("motion", motions)):
                 _check_in_plane(frame, what, array)
@@ -260,8 +308,9 @@ def condense(frame: Frame, *, planar: bool = False, n_steps: int = N_STEPS) -> N
         what `planar` asks for. In space a support must hold all three rotations or none: to hold one
         while the others are large has no meaning that does not depend on the path.
     """
-    if n_steps < 2 or n_steps % 2:
-        raise ValueError(f"n_steps must be an even number from 2 on, got {n_steps}")
+    # Two steps would be a loop of one round, which XLA opens and fuses into something a thousand times slower.
+    if n_steps < 4 or n_steps % 2:
+        raise ValueError(f"n_steps must be an even number from 4 on, got {n_steps}")
     arrays = frame_arrays(frame)
     if planar:
         check_planar(frame, arrays)

@@ -62,7 +62,7 @@ class Planar:
         vx, vy, turn = twist
         return fy * turn, -fx * turn, fx * vy - fy * vx
 
-    def yielding(self, pose: Components, compliance: Array, wrench: Components) -> Components:
+    def yielding(self, pose: Components, compliance: Components, wrench: Components) -> Components:
         """Twist per length about the origin under a wrench about the origin, of a section at `pose`."""
         x, y, _, c, s = pose
         fx, fy, m = wrench

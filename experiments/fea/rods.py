@@ -85,7 +85,7 @@ class Section(Protocol):
         """Change of a wrench on a body that moves by a twist."""
         ...
 
-    def yielding(self, pose: Components, compliance: Array, wrench: Components) -> Components:
+    def yielding(self, pose: Components, compliance: Components, wrench: Components) -> Components:
         """Twist per length about the origin under a wrench about the origin, of a section at `pose`."""
         ...
 
@@ -119,13 +119,13 @@ def integrate(
     n_steps : int
         Even.
     """
-    h = rods.length / n_steps
+    h, at_rest, compliance = rods.length / n_steps, tuple(rods.strain), tuple(rods.compliance)
     size = len(wrench)
     shape = (size, *wrench[0].shape)
     units = tuple(jnp.zeros(shape).at[i].set(1.0) for i in range(size))
 
     def strains(internal: Components) -> Components:
-        return tuple(e + c * x for e, c, x in zip(rods.strain, rods.compliance, internal, strict=True))
+        return tuple(e + c * x for e, c, x in zip(at_rest, compliance, internal, strict=True))
 
     def rates(internal: Components) -> Components:
         return section.rates(internal, strains(internal))
@@ -143,7 +143,7 @@ def integrate(
 
     def slope(pose: Components, twist: Components) -> Components:
         change = tuple(u + c for u, c in zip(units, section.carried(wrench, twist), strict=True))
-        return section.yielding(pose, rods.compliance, change)
+        return section.yielding(pose, compliance, change)
 
     def two_steps(now: tuple[Components, Components, Components], _: None) -> tuple[Any, Any]:
         here, pose, twist = now

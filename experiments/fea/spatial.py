@@ -58,7 +58,7 @@ class Spatial:
         n, m, v, turn = wrench[:3], wrench[3:], twist[:3], twist[3:]
         return (*_cross(n, turn), *(a + b for a, b in zip(_cross(m, turn), _cross(n, v), strict=True)))
 
-    def yielding(self, pose: Components, compliance: Array, wrench: Components) -> Components:
+    def yielding(self, pose: Components, compliance: Components, wrench: Components) -> Components:
         """Twist per length about the origin under a wrench about the origin, of a section at `pose`."""
         place, turn = pose[:3], _rows(pose[3:])
         force, moment = wrench[:3], wrench[3:]

@@ -49,6 +49,8 @@ class EquilibriumMap:
 
     def evaluate(self, points: ArrayLike) -> Answers:
         """Responses, a status and a reason for each point, shape (n, n_factors)."""
+        if not len(points):
+            return Answers(np.empty((0, self.n_responses)), [], [])
         found = self.solver.read(self._read_with_peak, *self._inputs(points))
         values, peaks = found.values[:, : self.n_responses], found.values[:, self.n_responses :]
         status = [Status.OK if ok else Status.NOT_CONVERGED for ok in found.ok]
@@ -96,6 +98,12 @@ class EquilibriumMap:
             return jnp.concatenate([self.read(answer), flat.max(axis=0)[None], where])
 
         return read
+
+
+def check_limit(oracle: str, stress_limit: float | None) -> None:
+    """Raise ``ValueError`` if there is a stress limit that is not positive."""
+    if stress_limit is not None and not stress_limit > 0.0:
+        raise ValueError(f"oracle {oracle!r}: stress_limit must be positive, got {stress_limit}")
 
 
 def intrinsic_xyz(rotation_vector: Array) -> Array:

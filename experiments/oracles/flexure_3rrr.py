@@ -16,7 +16,7 @@ from ..fea.stress import bending_stress, fibres
 from ..runs import Response, Status
 from ..settings import parameter
 from .base import Answers, Arrow, Line, Oracle, Shape
-from .equilibrium import BATCH, EquilibriumMap
+from .equilibrium import BATCH, EquilibriumMap, check_limit
 
 LEGS = (1, 2, 3)
 METHODS = ("beams", "assur")
@@ -33,7 +33,8 @@ class Flexure3RRR(Oracle):
     Raises
     ------
     ValueError
-        If a dimension is not positive, a leg does not span from base to platform, or the method is unknown.
+        If a dimension or the stress limit is not positive, a leg does not span from base to platform, or
+        the method is unknown.
 
     Notes
     -----
@@ -73,6 +74,7 @@ class Flexure3RRR(Oracle):
             raise ValueError(f"oracle 'flexure_3rrr': method must be one of {', '.join(METHODS)}, got {self.method!r}")
         if abs(self._elbow) >= 1.0:
             raise ValueError("oracle 'flexure_3rrr': a leg cannot span from base to platform; change its lengths")
+        check_limit(self.name, self.stress_limit)
 
     @property
     def factors(self) -> FactorSpace:
@@ -94,7 +96,7 @@ class Flexure3RRR(Oracle):
             Response("x", "m", "mm", 1e3),
             Response("y", "m", "mm", 1e3),
             Response("psi", "rad", "mrad", 1e3, "ψ"),
-            *(Response(f"torque_{leg}", "N.m", "N.mm", 1e3, f"τ{leg}") for leg in LEGS),
+            *(Response(f"torque_{leg}", "N.m", "N·mm", 1e3, f"τ{leg}") for leg in LEGS),
             Response("stress", "Pa", "MPa", 1e-6, "σ"),
         )
 

@@ -28,7 +28,7 @@ from ..fea.sensitivity import Answer
 from ..runs import Response
 from ..settings import parameter
 from .base import Answers, Arrow, JaxOracle, Line, PublishedMap, Shape
-from .equilibrium import BATCH, EquilibriumMap, intrinsic_xyz
+from .equilibrium import BATCH, EquilibriumMap, check_limit, intrinsic_xyz
 
 _DATA = json.loads((files("experiments.oracles") / "data" / "hexflex.json").read_text(encoding="utf-8"))
 _GEOMETRY = _DATA["geometry"]
@@ -54,8 +54,8 @@ class HexFlex(JaxOracle):
     Raises
     ------
     ValueError
-        If a dimension is not positive, the kinematics is unknown, a stress limit is asked of linear
-        kinematics, or the frame cannot be built; see :class:`experiments.fea.Frame`.
+        If a dimension or the stress limit is not positive, the kinematics is unknown, a stress limit is
+        asked of linear kinematics, or the frame cannot be built; see :class:`experiments.fea.Frame`.
 
     Notes
     -----
@@ -94,6 +94,7 @@ class HexFlex(JaxOracle):
             )
         if self.stress_limit is not None and not self.is_nonlinear:
             raise ValueError("oracle 'hexflex': stress_limit needs kinematics = 'nonlinear'")
+        check_limit(self.name, self.stress_limit)
 
     @property
     def is_nonlinear(self) -> bool:

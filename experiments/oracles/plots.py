@@ -18,10 +18,22 @@ def size(shape: Shape) -> float:
     return float(np.ptp(points, axis=0).max())
 
 
+def is_planar(shape: Shape) -> bool:
+    """Whether the mechanism lies in a plane of constant z and moves in it."""
+    lines = shape.lines
+    return bool(np.ptp(np.vstack([line.points for line in lines])[:, 2]) == 0.0) and not any(
+        line.displacement[:, 2].any() for line in lines
+    )
+
+
 def exaggeration(shape: Shape, visible: float = 0.25) -> float:
-    """A round factor (1, 2 or 5 times a power of ten) that shows the largest displacement as `visible` of the size."""
+    """A round factor (1, 2 or 5 times a power of ten) that shows the largest displacement as `visible` of the size.
+
+    1 where it is a twentieth of the size or more: it can be seen as it is, and large rotations that are
+    multiplied would stretch what is rigid.
+    """
     largest = max(float(np.linalg.norm(line.displacement, axis=1).max()) for line in shape.lines)
-    if largest == 0.0:
+    if largest == 0.0 or largest >= 0.05 * size(shape):
         return 1.0
     wanted = visible * size(shape) / largest
     power = 10.0 ** np.floor(np.log10(wanted))
@@ -29,7 +41,10 @@ def exaggeration(shape: Shape, visible: float = 0.25) -> float:
 
 
 def draw_shape(ax: "Axes3D", shape: Shape, factor: float | None = None) -> "Axes3D":
-    """Draw the displaced mechanism, displacements times `factor`, over the mechanism at rest (in mm)."""
+    """Draw the displaced mechanism, displacements times `factor`, over the mechanism at rest (in mm).
+
+    A planar mechanism is seen from above.
+    """
     factor = exaggeration(shape) if factor is None else factor
     for line in shape.lines:
         ax.plot(*(1e3 * line.points.T), color=REST, lw=1.0, ls=(0, (4, 2)), zorder=1)
@@ -45,6 +60,10 @@ def draw_shape(ax: "Axes3D", shape: Shape, factor: float | None = None) -> "Axes
         ax.text(*(foot + 1.15e3 * reach * arrow.direction), arrow.label, color=LOAD, fontsize=7)
     _equal_axes(ax, shape, factor)
     ax.set(xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]")
+    if is_planar(shape):
+        ax.view_init(elev=90.0, azim=-90.0)
+        ax.set_proj_type("ortho")
+        ax.set(zticks=[], zlabel="")
     return ax
 
 
