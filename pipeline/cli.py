@@ -5,6 +5,7 @@ import sys
 from collections.abc import Sequence
 
 from . import commands
+from .compilation import keep_compiled
 from .errors import FlexdoceError
 from .version import __version__
 
@@ -17,6 +18,7 @@ EPILOG = (
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     arguments = _parser().parse_args(argv)
+    keep_compiled()
     try:
         return arguments.command(arguments) or 0
     except FlexdoceError as error:
