@@ -59,3 +59,11 @@ def test_add_an_oracle_page_runs(registry, tmp_path):
     outcome = pipeline.run(config, tmp_path / "run", ["fit.design.budget=200"])
     assert outcome.kept == ("force", "stiffness")
     assert max(e.max_relative for e in outcome.model.validation) < 0.01
+
+
+def test_nonlinear_beams_page_runs():
+    names = {}
+    for code in blocks("docs/nonlinear-beams.md", "python"):
+        exec(compile(code, "docs/nonlinear-beams.md", "exec"), names)
+    assert names["found"].ok.all()
+    assert names["found"].at("tip")[1, 2] < 3 * names["found"].at("tip")[0, 2] < 0

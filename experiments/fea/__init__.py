@@ -1,20 +1,43 @@
-"""Finite elements for frames of beams in space; knows nothing of factors, designs or devices.
+"""Finite elements for frames of beams, linear and geometrically exact; knows nothing of factors, designs or devices.
 
-A :class:`Frame` says what is built: nodes, straight members, rigid bodies, clamps. A solver takes it
-from there, so that several solvers can share one description.
+A :class:`Frame` says what is built: nodes, straight and circular members, rigid bodies, clamps, supports.
+Two solvers take it from there: :func:`factorise` for small displacements, :func:`condense` for large.
 
-===================  =============================================================================
-:mod:`.model`        materials, members, rigid bodies, frames, loads
-:mod:`.checks`       the refusals of a bad frame, one sentence each
-:mod:`.sections`     cross-sections: the rectangle, the circle
-:mod:`.elements`     the Timoshenko beam: pure functions of coordinates and section properties
-:mod:`.arrays`       a frame as arrays
-:mod:`.assembly`     the stiffness of the frame and the kinematics of its rigid bodies: pure functions
-:mod:`.mechanisms`   frames that nothing holds, or hardly anything
-:mod:`.linear`       factorise once, solve many load cases
-:mod:`.results`      the deformed centrelines
-:mod:`.precision`    float64 for this package alone
-===================  =============================================================================
+=====================  ===========================================================================
+:mod:`.model`          materials, members, rigid bodies, supports, frames, loads, motions
+:mod:`.checks`         the refusals of a bad frame, one sentence each
+:mod:`.sections`       cross-sections: the rectangle, the circle
+:mod:`.shapes`         members at rest: length, axes, bend
+:mod:`.arrays`         a frame as arrays
+:mod:`.loads`          load cases and prescribed motions as arrays
+:mod:`.mechanisms`     frames that nothing holds, or hardly anything
+:mod:`.stress`         stresses from internal forces
+:mod:`.results`        the deformed centrelines
+:mod:`.precision`      float64 for this package alone
+**small**
+:mod:`.elements`       the Timoshenko beam and the arc: pure functions of shape and properties
+:mod:`.assembly`       the stiffness of the frame and the kinematics of its rigid bodies
+:mod:`.linear`         factorise once, solve many load cases
+:mod:`.varying`        one frame in many geometries
+**large**
+:mod:`.rods`           a member as an initial value problem
+:mod:`.planar`         motions, poses and wrenches in the plane
+:mod:`.spatial`        the same in space
+:mod:`.planes`         which frames move in a plane
+:mod:`.blocks`         small dense blocks, many at once
+:mod:`.elimination`    block elimination with a plan
+:mod:`.condensed`      a frame as whole numbers and arrays of order one
+:mod:`.scaling`        from SI units to these
+:mod:`.blockloads`     loads and motions of nodes as those of blocks
+:mod:`.tangent`        residual, tangent, Newton's step
+:mod:`.newton`         Newton's method at one go or in load steps
+:mod:`.conclusion`     what a converged state is worth, and its stability
+:mod:`.kernel`         the compiled whole
+:mod:`.sensitivity`    what is read off, and its derivatives
+:mod:`.path`           paths past limit points
+:mod:`.equilibria`     answers in SI units
+:mod:`.nonlinear`      condense once, solve many cases
+=====================  ===========================================================================
 
 Conventions: SI units and radians. A node has six unknowns, (ux, uy, uz, θx, θy, θz), in global axes.
 A member's local x runs from start to end, local z is the part of `up` normal to x, and y = z × x.
@@ -29,6 +52,9 @@ All is computed in float64; the global setting ``jax_enable_x64`` is neither nee
 >>> solution = factorise(frame).solve(load_array(frame, [[Load("tip", force=(0, 0, -1.0))]]))
 >>> float(solution.at("tip")[0, 2].round(6))
 -0.001905
+>>> large = condense(frame, n_steps=4).solve(load_array(frame, [[Load("tip", force=(0, 0, -20.0))]]))
+>>> large.at("tip")[0, [0, 2]].round(4).tolist()
+[-0.0071, -0.0336]
 """
 
 from .equilibria import Equilibria, Path
