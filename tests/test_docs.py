@@ -66,4 +66,5 @@ def test_nonlinear_beams_page_runs():
     for code in blocks("docs/nonlinear-beams.md", "python"):
         exec(compile(code, "docs/nonlinear-beams.md", "exec"), names)
     assert names["found"].ok.all()
-    assert names["found"].at("tip")[1, 2] < 3 * names["found"].at("tip")[0, 2] < 0
+    deflection = names["found"].at("tip")[:, 2]
+    assert 4 * deflection[0] < deflection[1] < deflection[0] < 0  # four times the load, less than four times the way

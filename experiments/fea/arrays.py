@@ -65,7 +65,7 @@ class FrameArrays:
     @property
     def is_curved(self) -> NDArray[np.bool_]:
         """Which members are arcs, shape (n_members,)."""
-        return self.bends.any(axis=1)
+        return np.asarray(self.bends.any(axis=1))
 
 
 def frame_arrays(frame: Frame) -> FrameArrays:

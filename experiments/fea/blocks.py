@@ -27,11 +27,6 @@ def transpose(matrix: Array) -> Array:
     return jnp.swapaxes(matrix, 0, 1)
 
 
-def identity(size: int, like: Array) -> Array:
-    """Unit matrices, (size, size, ...), with the batch axes of `like`, shape (...)."""
-    return np.eye(size).reshape(size, size, *(1,) * like.ndim) + jnp.zeros_like(like)
-
-
 def inverse(matrix: Array) -> tuple[Array, Array]:
     """Inverse and pivots of every block, (n, n, ...) and (n, ...), by Gauss–Jordan without exchange of rows.
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jax import Array
@@ -199,7 +199,7 @@ def equilibria(what: Described, settled: Settled, rest_centre: Array, only_stabl
     forces = np.repeat([units.force, units.force * units.length], 3)
     motions = np.repeat([units.length, 1.0], 3)
 
-    def real(values: Array, scale: Floats) -> Floats:
+    def real(values: Any, scale: Floats) -> Floats:
         values = np.asarray(values)
         if len(values) == 6:
             full = values.copy()
@@ -212,7 +212,7 @@ def equilibria(what: Described, settled: Settled, rest_centre: Array, only_stabl
 
     height = coordinates[2, 0]
 
-    def points(values: Array) -> Floats:
+    def points(values: Any) -> Floats:
         values = np.array(values) * units.length
         return values if len(values) == 3 else np.concatenate([values, np.zeros_like(values[:1]) + height])
 

@@ -25,6 +25,9 @@ TURN = 0.5
 """Largest prescribed motion, in lengths and radians, of a first step: turns beyond π would be made the other way."""
 
 
+Numbers = Any
+"""An array: JAX's where it is compiled, NumPy's where it has come out."""
+
 View = Callable[[Topology, Problem, State, Conclusion], Any]
 """What is handed out of the compiled part: arrays with the points last, of converged states."""
 
@@ -45,12 +48,12 @@ class Settled(NamedTuple):
     """
 
     seen: Any
-    arrived: NDArray[np.bool_]
-    reached: NDArray[np.float64]
-    residual: NDArray[np.float64]
-    astray: NDArray[np.float64]
-    unstable: NDArray[np.int64]
-    iterations: NDArray[np.int64]
+    arrived: Numbers
+    reached: Numbers
+    residual: Numbers
+    astray: Numbers
+    unstable: Numbers
+    iterations: Numbers
 
     def is_sound(self, only_stable: bool) -> NDArray[np.bool_]:
         """Which points are equilibria, and stable if that is asked for."""
@@ -60,7 +63,7 @@ class Settled(NamedTuple):
     def reasons(self, only_stable: bool) -> tuple[str, ...]:
         """Why a point has no answer; empty where it has."""
         why = zip(self.is_sound(only_stable), self.arrived, self.reached, self.unstable, self.residual, strict=True)
-        return tuple("" if sound else _reason(*rest, only_stable) for sound, *rest in why)
+        return tuple("" if sound else _reason(a, r, u, left, only_stable) for sound, a, r, u, left in why)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ from functools import cached_property, partial
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jax.typing import ArrayLike
 from numpy.typing import NDArray
@@ -33,7 +34,7 @@ from .planes import check_planar, check_rotations
 from .precision import in_float64
 from .rods import Rods
 from .scaling import Geometry, Units
-from .sensitivity import Directions, Frozen, Read, Reading, differentiating, reading
+from .sensitivity import Frozen, Read, Reading, differentiating, reading
 from .spatial import Spatial
 
 Floats = NDArray[np.float64]
@@ -173,12 +174,12 @@ class NonlinearSolver:
         given = self._checked(loads, motions, None)
         toward = self._checked(load_directions, motion_directions, None)
         a, space, unit = self.arrays, self.kernel.topology.space, self.units
-        directions = Directions(
+        directions = (
             np.moveaxis(dead_loads(a, space, unit, a.coordinates.T[..., None], toward[0]), -1, 0)[..., None],
             np.zeros((len(toward[0]), space.size, a.n_blocks, 1)),
             np.moveaxis(prescribed(a, space, unit, toward[1]), -1, 0)[..., None],
         )
-        view = differentiating(read, unit, *(Frozen(part) for part in directions))
+        view = differentiating(read, unit, *map(Frozen, directions))
 
         def solved(rows: NDArray[np.int64]) -> Floats:
             settled, _ = self._settled(view, given, None, rows, True)
@@ -238,7 +239,8 @@ class NonlinearSolver:
     ) -> tuple[Settled, Any]:
         """One chunk, filled up with its last case, and the centres of its sections at rest."""
         full = rows[np.minimum(np.arange(CHUNK), len(rows) - 1)]
-        problem, centre = self.problem(*(array[full] for array in given), taken(geometry, full))
+        loads, motions, followers = (array[full] for array in given)
+        problem, centre = self.problem(loads, motions, followers, taken(geometry, full))
         settled = self.kernel.settle(problem, view, only_stable)
         return taken(settled, np.arange(len(rows))), taken(centre, np.arange(len(rows)))
 
@@ -252,9 +254,9 @@ class NonlinearSolver:
         problem = Problem(
             rods,
             rest,
-            dead_loads(a, space, unit, coordinates, loads),
-            follower_loads(a, space, unit, coordinates, followers),
-            prescribed(a, space, unit, motions),
+            jnp.asarray(dead_loads(a, space, unit, coordinates, loads)),
+            jnp.asarray(follower_loads(a, space, unit, coordinates, followers)),
+            jnp.asarray(prescribed(a, space, unit, motions)),
         )
         return problem, centre
 

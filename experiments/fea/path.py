@@ -160,11 +160,12 @@ class _Walk:
 
     def _arrived(self, state: State, level: float, arc: float, tries: int, normal: Array) -> PathPoint:
         """The point of a state that is nearly there; the last corrections are made at a constant level."""
+        taken, found = self._evaluate(self.problem, state, jnp.full(1, level))
         for _ in range(PATIENCE):
-            taken, found = self._evaluate(self.problem, state, jnp.full(1, level))
             if not found.undone[0] > AIM:
                 break
             state = self._moved(state, taken, jnp.array([1.0, 0.0]))
+            taken, found = self._evaluate(self.problem, state, jnp.full(1, level))
         way = taken.motion[:, 1]
         slope = float(np.sign(jnp.vdot(normal, way))) / _norm(way)
         worth = self._conclude(self.problem, state, found)

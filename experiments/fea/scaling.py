@@ -92,7 +92,7 @@ def member_shapes(arrays: FrameArrays, geometry: Geometry) -> Shapes:
 
 def rods(arrays: FrameArrays, space: Space, unit: Units, geometry: Geometry, shape: Shapes) -> Rods:
     """The members of a frame."""
-    x, a, b = geometry.coordinates, arrays.ends[:, 0], arrays.ends[:, 1]
+    x, a, b = jnp.asarray(geometry.coordinates), arrays.ends[:, 0], arrays.ends[:, 1]
     offsets = [(x[:, n] - x[:, arrays.master[n]]) / unit.length for n in (a, b)]
     length = shape.length / unit.length
     p, f = geometry.properties, unit.force

@@ -86,9 +86,9 @@ class Frozen:
 @lru_cache(maxsize=32)
 def differentiating(read: Read, units: Units, *directions: Frozen) -> Any:
     """The view of the solver that gives the derivatives of what `read` reads along `directions`."""
-    along = Directions(*(part.values for part in directions))
 
     def view(topology: Topology, problem: Problem, state: State, found: Conclusion) -> Array:
+        along = Directions(*(jnp.asarray(part.values) for part in directions))
         return rates(topology, units, read, problem, state, along)
 
     return view

@@ -11,7 +11,7 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
-from .blocks import apply, four, skew
+from .blocks import apply, four, multiply, skew
 from .rods import Along, Components, Rods, along, even_series, integrate
 
 
@@ -149,7 +149,7 @@ class Spatial:
         none = jnp.zeros_like(pose[0] + load[0])
         turn = rotation_matrix(pose[3:])
         first = load[6:].reshape(3, 3, *load.shape[1:])
-        moved = sum(turn[:, k, None] * first[None, k] for k in range(3))  # Σ (R d)ᵢ fⱼ
+        moved = multiply(turn, first + none)  # Σ (R d)ᵢ fⱼ
         moment = [moved[1, 2] - moved[2, 1], moved[2, 0] - moved[0, 2], moved[0, 1] - moved[1, 0]]
         trace = moved[0, 0] + moved[1, 1] + moved[2, 2]
         stiffness = _unit(none) * trace - moved

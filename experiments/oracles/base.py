@@ -96,8 +96,8 @@ class Oracle(ABC):
 
     Attributes
     ----------
-    name, summary, source, limits : str
-        What it is called, what it answers, where the physics comes from, what it leaves out.
+    name, summary, source : str
+        What it is called, what it answers, where the physics comes from.
     version : str
         Raised whenever the answers change.
     batch : int
@@ -109,7 +109,6 @@ class Oracle(ABC):
     name: ClassVar[str]
     summary: ClassVar[str] = ""
     source: ClassVar[str] = ""
-    limits: ClassVar[str] = ""
     version: ClassVar[str] = "1"
     batch: ClassVar[int] = 1
     resolution: ClassVar[float] = 0.0
@@ -136,6 +135,11 @@ class Oracle(ABC):
         ValueError
             If the parameters describe something that cannot be built.
         """
+
+    @property
+    def limits(self) -> str:
+        """What the physics leaves out, for the report; it may depend on the parameters."""
+        return ""
 
     @property
     def parameters(self) -> dict[str, Any]:

@@ -34,7 +34,6 @@ class Cantilever(JaxOracle):
 
     name: ClassVar[str] = "cantilever"
     summary: ClassVar[str] = "tip-loaded leaf spring, small displacements, closed form"
-    limits: ClassVar[str] = "Small displacements, no shear"
     source: ClassVar[str] = "Roark's Formulas for Stress and Strain, 7th ed., Table 8.1, case 1a"
     resolution: ClassVar[float] = 1e-12
 
@@ -43,6 +42,11 @@ class Cantilever(JaxOracle):
     def __post_init__(self) -> None:
         if not self.young > 0.0:
             raise ValueError(f"oracle 'cantilever': young must be positive, got {self.young}")
+
+    @property
+    def limits(self) -> str:
+        """What the closed form leaves out."""
+        return "Small displacements, no shear"
 
     @property
     def factors(self) -> FactorSpace:

@@ -49,7 +49,7 @@ class EquilibriumMap:
 
     def evaluate(self, points: ArrayLike) -> Answers:
         """Responses, a status and a reason for each point, shape (n, n_factors)."""
-        if not len(points):
+        if not np.size(points):
             return Answers(np.empty((0, self.n_responses)), [], [])
         found = self.solver.read(self._read_with_peak, *self._inputs(points))
         values, peaks = found.values[:, : self.n_responses], found.values[:, self.n_responses :]

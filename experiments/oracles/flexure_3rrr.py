@@ -45,10 +45,6 @@ class Flexure3RRR(Oracle):
     name: ClassVar[str] = "flexure_3rrr"
     summary: ClassVar[str] = "planar 3-RRR flexure mechanism, 3 crank angles and a wrench to pose, torques and stress"
     source: ClassVar[str] = "Durango et al., thesis section 1.1; geometry recovered from its printed joints"
-    limits: ClassVar[str] = (
-        "Links are rigid and flexures are leaves without notches. The largest stress is that of bending, and is not "
-        "smooth where its place jumps from one flexure to another"
-    )
     # What the nonlinear solver leaves undone is below 1e-11 of the answers; two digits are kept in hand.
     resolution: ClassVar[float] = 1e-9
     batch: ClassVar[int] = BATCH
@@ -75,6 +71,14 @@ class Flexure3RRR(Oracle):
         if abs(self._elbow) >= 1.0:
             raise ValueError("oracle 'flexure_3rrr': a leg cannot span from base to platform; change its lengths")
         check_limit(self.name, self.stress_limit)
+
+    @property
+    def limits(self) -> str:
+        """What this model leaves out."""
+        return (
+            "Links are rigid and flexures are leaves without notches. The largest stress is that of bending, and is "
+            "not smooth where its place jumps from one flexure to another"
+        )
 
     @property
     def factors(self) -> FactorSpace:
