@@ -89,7 +89,7 @@ class Equilibria:
         if not arm.any():
             return motion.copy()
         turn = self.rotation(node)
-        carried = turn.apply(np.broadcast_to(arm, (len(self), 3))) - arm
+        carried = turn.apply(arm + np.zeros((len(self), 3))) - arm
         return motion + np.hstack([carried, np.zeros_like(carried)])
 
     @cached_property
