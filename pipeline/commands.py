@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from experiments import designs, oracles, settings
-from surrogates import Surrogate, exports, load
+from surrogates import Surrogate, exports, load, obstacle
 
 from . import tables
 from .config import dump_config, load_config
@@ -73,6 +73,10 @@ def invert(arguments: Namespace) -> None:
     """``flexdoce invert``."""
     model = _model(arguments.model)
     targets = read_points(_text(arguments.table), model.responses, _origin(arguments.table))
+    if why := obstacle(model):
+        raise InputError(
+            f"{arguments.model} has no inverse: {why}; in Python, model.invert(...).nearest_settings come nearest"
+        )
     inversion = model.invert(targets)
     _emit(tables.inversion_csv(targets, inversion, model.factors, model.responses), arguments.out)
     if not inversion.ok.all():

@@ -75,7 +75,7 @@ def summary(outcome: Outcome) -> None:
         table.add_column(heading, justify="right", no_wrap=True)
     for j, (response, error) in enumerate(zip(model.responses, model.validation, strict=True)):
         scale = response.shown_scale
-        loop = f"{trip.errors[j].max_abs * scale:.2e}" if trip.errors else "–"
+        loop = f"{trip.errors[j].max_abs * scale:.2e}" if trip and trip.errors else "–"
         table.add_row(
             f"{response.symbol} \\[{response.shown_unit}]",
             " ".join(outcome.screening.active_on(response.name)) or "none",
@@ -90,11 +90,7 @@ def summary(outcome: Outcome) -> None:
     if outcome.screening.undecided:
         names = ", ".join(outcome.screening.undecided)
         console.print(f"Screening could not decide who acts on {names}: all factors are kept.", style="yellow")
-    if model.certificate:
-        console.print(f"Inverse: {model.certificate.verdict}; {model.certificate.reason}.")
-    answered = len(trip.targets) - trip.n_refused
-    apart = f"; there the oracle is within {100 * trip.worst:.2g} % of the range of what was wanted"
-    console.print(f"Round trip: {answered} of {len(trip.targets)} responses inverted{apart if trip.errors else ''}.")
+    _inverse(outcome)
     seconds = np.sum(list(outcome.seconds.values()))
     console.print(f"Took {seconds:.1f} s.")
     places = {"Report": "report.html", "Model": "model.json"}
@@ -102,6 +98,18 @@ def summary(outcome: Outcome) -> None:
         places["Code"] = "exports"
     for what, name in places.items():
         console.print(f"{what + ':':<8}[bold]{escape(str(outcome.path / name))}[/bold]", soft_wrap=True)
+
+
+def _inverse(outcome: Outcome) -> None:
+    certificate, trip = outcome.model.certificate, outcome.round_trip
+    if trip is None:
+        console.print(f"Inverse: none; {outcome.obstacle}.")
+        return
+    if certificate:
+        console.print(f"Inverse: {certificate.verdict}; {certificate.reason}.")
+    answered = len(trip.targets) - trip.n_refused
+    apart = f"; there the oracle is within {100 * trip.worst:.2g} % of the range of what was wanted"
+    console.print(f"Round trip: {answered} of {len(trip.targets)} responses inverted{apart if trip.errors else ''}.")
 
 
 def _title(outcome: Outcome) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 from experiments.designs import Design, Random
 from experiments.runs import Runs
 from experiments.screening import Screening
-from surrogates import RoundTrip, Surrogate, dumps, exports, loads
+from surrogates import RoundTrip, Surrogate, dumps, exports, loads, obstacle
 
 from . import stages, tables
 from .config import load_config
@@ -36,7 +36,8 @@ class Outcome:
     kept : tuple of str
         Factors that the model was fitted on.
     model : Surrogate
-    round_trip : RoundTrip
+    round_trip : RoundTrip or None
+        None if the inversion was left out, for the reason in `obstacle`.
     shortfalls : tuple of str
         Declared requirements that do not hold.
     seconds : dict
@@ -51,9 +52,14 @@ class Outcome:
     fit_runs: Runs
     model: Surrogate
     validation_runs: Runs
-    round_trip: RoundTrip
+    round_trip: RoundTrip | None
     shortfalls: tuple[str, ...]
     seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def obstacle(self) -> str:
+        """Why the inversion was left out; empty if it was not."""
+        return obstacle(self.model)
 
 
 def run(
@@ -117,8 +123,12 @@ class _Runner:
             validation_runs = self._executed("validation", stages.validation_design(study))
             model = stages.validated(study, model, validation_runs)
             folder.write("validation/errors.csv", tables.errors_csv(model.validation, model.responses))
-        with self._timed("inversion"):
-            trip = self._round_trip(model, validation_runs)
+        trip = None
+        if obstacle(model):
+            folder.discard("inversion")
+        else:
+            with self._timed("inversion"):
+                trip = self._round_trip(model, validation_runs)
         with self._timed("export"):
             folder.write("model.json", dumps(model))
             self._export()
@@ -177,13 +187,11 @@ def read_run(path: str | Path) -> Outcome:
     folder, config = RunFolder.existing(Path(path))
     study = resolve(config)
     model = _read_model(folder, study)
-    runs = {stage: _read_stage(folder, study, stage) for stage in STAGES}
+    is_inverted = not obstacle(model)
+    runs = {stage: _read_stage(folder, study, stage) for stage in STAGES if stage != "inversion" or is_inverted}
     try:
         screening = stages.screened(study, runs["screening"])
-        targets, inversion, design = stages.inversion_design(model, runs["validation"])
-        if len(design) != len(runs["inversion"]):
-            raise ValueError("its inversion does not belong to its validation")
-        trip = stages.confirmed(study, targets, inversion, runs["inversion"])
+        trip = _read_round_trip(study, model, runs["validation"], runs["inversion"]) if is_inverted else None
         kept = stages.kept_factors(study, screening)
     except (ValueError, FlexdoceError) as error:
         raise InputError(f"the run folder {folder.path} is damaged: {error}; run the study again") from None
@@ -209,6 +217,13 @@ def _read_model(folder: RunFolder, study: Study) -> Surrogate:
     if model.factors != study.space or model.responses != study.oracle.responses or not model.validation:
         raise InputError(f"{where} is not the model of this study: run the study again")
     return model
+
+
+def _read_round_trip(study: Study, model: Surrogate, validation_runs: Runs, answers: Runs) -> RoundTrip:
+    targets, inversion, design = stages.inversion_design(model, validation_runs)
+    if len(design) != len(answers):
+        raise ValueError("its inversion does not belong to its validation")
+    return stages.confirmed(study, targets, inversion, answers)
 
 
 def _read_stage(folder: RunFolder, study: Study, stage: str) -> Runs:

@@ -8,7 +8,7 @@ import surrogates
 from experiments.designs import Design, Random
 from experiments.runs import Runs
 from experiments.screening import Screening, screen
-from surrogates import Inversion, RoundTrip, Surrogate, Verdict, certify, errors, round_trip
+from surrogates import Inversion, RoundTrip, Surrogate, Verdict, certify, errors, obstacle, round_trip
 
 from .config import dump_config
 from .errors import InputError, TooManyFailures
@@ -119,7 +119,8 @@ def shortfalls(study: Study, surrogate: Surrogate) -> list[str]:
     certificate = surrogate.certificate
     if require.certified_inverse and (certificate is None or certificate.verdict is not Verdict.CERTIFIED):
         verdict = certificate.verdict if certificate else "missing"
-        found.append(f"the inverse is not certified (verdict: {verdict})")
+        why = f"; {against}" if (against := obstacle(surrogate)) else ""
+        found.append(f"the inverse is not certified (verdict: {verdict}{why})")
     return found
 
 

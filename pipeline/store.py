@@ -99,6 +99,14 @@ class RunFolder:
         except (OSError, UnicodeDecodeError):
             raise InputError(f"{self.path / name} is missing or unreadable: run the study again") from None
 
+    def discard(self, name: str) -> None:
+        """Remove a file or folder of ours, if it is there."""
+        target = self.path / name
+        if target.is_dir() and not target.is_symlink():
+            shutil.rmtree(target)
+        else:
+            target.unlink(missing_ok=True)
+
     def points(self, oracle: Oracle) -> "PointStore":
         """The store of evaluated points for `oracle`."""
         return PointStore(self.path / POINTS, oracle)
@@ -106,11 +114,7 @@ class RunFolder:
     def _empty(self) -> None:
         """Remove our files and our folders; the config is written over, if it differs."""
         for name in OURS:
-            target = self.path / name
-            if target.is_dir() and not target.is_symlink():
-                shutil.rmtree(target)
-            else:
-                target.unlink(missing_ok=True)
+            self.discard(name)
 
 
 class PointStore:

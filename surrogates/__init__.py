@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from .artefact import dumps, load, loads
 from .certificate import Certificate, Verdict, certify
-from .inversion import AffineInverse, Inversion, InversionStatus, affine_inverse, affine_map
+from .inversion import AffineInverse, Inversion, InversionStatus, affine_inverse, affine_map, obstacle
 from .model import Surrogate
 from .round_trip import RoundTrip, round_trip
 from .validation import ResponseError, errors
@@ -45,6 +45,7 @@ __all__ = [
     "errors",
     "load",
     "loads",
+    "obstacle",
     "round_trip",
 ]
 

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .inversion import obstacle
+
 if TYPE_CHECKING:
     from .model import Surrogate
 
@@ -56,14 +58,19 @@ def certify(model: "Surrogate") -> Certificate:
     """
     claim = "no two settings in the domain have the same responses (the model is injective there)"
     if not model.is_affine:
+        against = obstacle(model)
+        how = (
+            f"it has no inverse: {against}"
+            if against
+            else ("its inverse is iterative and every answer is checked against the model")
+        )
         return Certificate(
             claim,
             Verdict.UNDECIDED,
             "none",
             None,
             (),
-            "the model has terms above degree one, for which injectivity is not proven here; "
-            "its inverse is iterative and every answer is checked against the model",
+            f"the model has terms above degree one, for which injectivity is not proven here; {how}",
         )
     scaled = model.jacobian_coded(np.zeros((1, len(model.factors))))[0] / model.scale[:, None]
     _, singular, directions = np.linalg.svd(scaled)

@@ -93,6 +93,21 @@ class AffineInverse:
     condition: float
 
 
+def obstacle(model: "Surrogate") -> str:
+    """Why wanted responses cannot be inverted in practice, in words that end a sentence; empty where they can.
+
+    A curved model whose responses outnumber the factors that act on them reaches a surface that nothing
+    measured or simulated lies on exactly: off it by the fit's own error, every target would be refused.
+    """
+    used = (model.coefficients != 0.0) & (model.terms.degrees > 0)[:, None]
+    exponents = np.array(model.terms.exponents).reshape(len(model.terms), len(model.factors))
+    n_moving, n_acting = int(used.any(axis=0).sum()), int(exponents[used.any(axis=1)].any(axis=0).sum())
+    if model.is_affine or n_moving <= n_acting:
+        return ""
+    factors = "1 factor" if n_acting == 1 else f"{n_acting} factors"
+    return f"{n_moving} responses follow from {factors}, so that they cannot be chosen independently of each other"
+
+
 def affine_map(model: "Surrogate") -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Matrix (n_responses, n_factors) and offset (n_responses,) of an affine model, in physical units.
 
@@ -150,6 +165,11 @@ def invert(model: "Surrogate", targets: ArrayLike) -> Inversion:
     ------
     ValueError
         If `targets` has the wrong shape or a value that is not finite.
+
+    Notes
+    -----
+    Where there is an :func:`obstacle`, only targets that are consistent to rounding are reached; of any
+    other, the nearest settings are a local least-squares answer.
     """
     targets = np.asarray(targets, dtype=np.float64)
     if targets.ndim != 2 or targets.shape[1] != len(model.responses):

@@ -8,6 +8,7 @@ import jsonschema
 import pytest
 
 import pipeline
+import pipeline.runner
 from pipeline.config import json_schema
 
 CONFIGS = Path(__file__).parents[1] / "configs"
@@ -30,6 +31,29 @@ def test_example_resolves(path):
     assert study.config.name == path.stem
     assert study.config.title
     assert len(study.screening_design) > len(study.space)
+
+
+SMALL = ("fit.degree=2", "fit.design.n_runs=42", "fit.design.budget=200", "validation.n_runs=20")
+
+
+def test_flexure_3rrr_runs_in_small(tmp_path):
+    """From config to report, with few runs; what the model is worth is not asked here."""
+    outcome = pipeline.run(CONFIGS / "flexure_3rrr.toml", tmp_path, SMALL)
+    assert outcome.obstacle.startswith("7 responses follow from 6 factors")
+    assert outcome.round_trip is None
+    report = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "polynomial of degree 2" in report
+    assert '"planar":true' in report
+
+
+def test_hexflex_nonlinear_runs_in_small(tmp_path, monkeypatch):
+    """Without the report, which compiles the solver once more to draw the mechanism."""
+    monkeypatch.setattr(pipeline.runner, "write_report", lambda folder, outcome: folder.path)
+    outcome = pipeline.run(CONFIGS / "hexflex_nonlinear.toml", tmp_path, [*SMALL, "require.max_relative_error=0.1"])
+    assert outcome.shortfalls == ()
+    assert not outcome.model.is_affine
+    assert outcome.round_trip is not None
+    assert outcome.study.oracle.is_nonlinear
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda p: p.stem)

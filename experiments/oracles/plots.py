@@ -9,6 +9,9 @@ from .base import Shape
 if TYPE_CHECKING:
     from mpl_toolkits.mplot3d.axes3d import Axes3D
 
+STRETCH = 0.15
+"""Of a rigid part in a drawing with multiplied displacements."""
+
 REST, MOVED, RIGID, LOAD, ANCHOR = "#94a3b8", "#1d4ed8", "#0f172a", "#c2410c", "#475569"
 
 
@@ -29,15 +32,28 @@ def is_planar(shape: Shape) -> bool:
 def exaggeration(shape: Shape, visible: float = 0.25) -> float:
     """A round factor (1, 2 or 5 times a power of ten) that shows the largest displacement as `visible` of the size.
 
-    1 where it is a twentieth of the size or more: it can be seen as it is, and large rotations that are
-    multiplied would stretch what is rigid.
+    Smaller, down to 1, where it would stretch what is rigid by more than :data:`STRETCH`, as large
+    rotations do that are multiplied.
     """
     largest = max(float(np.linalg.norm(line.displacement, axis=1).max()) for line in shape.lines)
-    if largest == 0.0 or largest >= 0.05 * size(shape):
+    if largest == 0.0:
         return 1.0
     wanted = visible * size(shape) / largest
     power = 10.0 ** np.floor(np.log10(wanted))
-    return float(power * max(m for m in (1.0, 2.0, 5.0) if m * power <= wanted * (1.0 + 1e-9)))
+    steps = [m * p for p in (power / 10.0, power) for m in (1.0, 2.0, 5.0) if m * p <= wanted * (1.0 + 1e-9)]
+    fair = [f for f in steps if f <= 1.0 or _stretch(shape, f) <= STRETCH]
+    return float(fair[-1] if fair else steps[0])
+
+
+def _stretch(shape: Shape, factor: float) -> float:
+    """Largest relative change of length of what is rigid, where displacements are multiplied by `factor`."""
+    found = 0.0
+    for line in shape.lines:
+        if line.rigid:
+            rest, moved = (np.linalg.norm(np.diff(p, axis=0), axis=1) for p in (
+                line.points, line.points + factor * line.displacement))  # fmt: skip
+            found = max(found, float((np.abs(moved - rest) / np.where(rest > 0.0, rest, np.inf)).max()))
+    return found
 
 
 def draw_shape(ax: "Axes3D", shape: Shape, factor: float | None = None) -> "Axes3D":

@@ -6,7 +6,8 @@
   if (!cases.length || !box) return;
   const NS = "http://www.w3.org/2000/svg";
   const W = 1000, H = 440;
-  let turn = -0.9, tilt = 0.95, chosen = 0, gain = 1;
+  const planar = cases.every((c) => c.planar);
+  let turn = planar ? 0 : -0.9, tilt = planar ? Math.PI / 2 : 0.95, chosen = 0, gain = 1;
 
   box.replaceChildren();
   const svg = document.createElementNS(NS, "svg");
@@ -80,6 +81,7 @@
     }
     [[1, 0, 0], [0, 1, 0], [0, 0, 1]].forEach((axis, i) => {
       const q = project(axis);
+      if (Math.hypot(...q) < 0.05) return; // it points at the reader
       add("line", { x1: 60, y1: H - 60, x2: 60 + 34 * q[0], y2: H - 60 + 34 * q[1], stroke: "#475569", "stroke-width": 1.5 });
       add("text", { x: 55 + 48 * q[0], y: H - 55 + 48 * q[1], fill: "#475569", "font-size": 14 }, "xyz"[i]);
     });

@@ -7,10 +7,13 @@ import numpy as np
 
 from experiments.designs import METHODS, level_discrepancy_squared
 from experiments.oracles import Shape
-from experiments.oracles.plots import exaggeration, size
+from experiments.oracles.plots import exaggeration, is_planar, size
 from surrogates import Verdict, affine_inverse, affine_map
 
 from ..runner import Outcome
+
+MOST_NAMED = 12
+"""Terms of one response that are listed by name beside the design; all of them are in the table of coefficients."""
 
 
 def number(value: float, digits: int = 4) -> str:
@@ -37,7 +40,7 @@ def percent(value: float) -> str:
 
 
 def headline(outcome: Outcome) -> list[dict[str, str]]:
-    """The four numbers that a reader wants first."""
+    """The numbers that a reader wants first."""
     model, trip = outcome.model, outcome.round_trip
     worst = max(model.validation, key=lambda e: e.max_relative)
     used = sum(len(model.terms_of(j)) for j in range(len(model.responses)))
@@ -47,6 +50,25 @@ def headline(outcome: Outcome) -> list[dict[str, str]]:
     if certificate and certificate.condition is not None:
         verdict += f", condition {number(certificate.condition, 3)}"
     certified = verdict.startswith("certified")
+    inverse = [
+        {
+            "label": "inverse",
+            "value": verdict,
+            "note": "no two settings in the box give the same responses" if certified else "see “Inverse” below",
+        }
+    ]
+    if trip is None:
+        inverse = [{"label": "inverse", "value": "none", "note": outcome.obstacle}]
+    else:
+        inverse.append(
+            {
+                "label": "round trip",
+                "value": f"{len(trip.targets) - trip.n_refused} of {len(trip.targets)} inverted",
+                "note": f"there the oracle is within {percent(trip.worst)} of the range of what was wanted"
+                if trip.errors
+                else "none could be tried on the oracle",
+            }
+        )
     return [
         {
             "label": "model",
@@ -58,16 +80,7 @@ def headline(outcome: Outcome) -> list[dict[str, str]]:
             "value": f"{percent(worst.max_relative)} of the range",
             "note": f"against the oracle on {worst.n_runs} fresh random runs, in {worst.response}",
         },
-        {
-            "label": "inverse",
-            "value": verdict,
-            "note": "no two settings in the box give the same responses" if certified else "see “Inverse” below",
-        },
-        {
-            "label": "round trip",
-            "value": f"{len(trip.targets) - trip.n_refused} of {len(trip.targets)} inverted",
-            "note": f"there the oracle is within {percent(trip.worst)} of the range of what was wanted",
-        },
+        *inverse,
     ]
 
 
@@ -156,6 +169,17 @@ def coefficients(outcome: Outcome) -> list[dict[str, Any]]:
     ]
 
 
+def terms(outcome: Outcome) -> list[str]:
+    """The terms of each response: by name, or counted by degree where there are too many to read."""
+    model, found = outcome.model, []
+    for j in range(len(model.responses)):
+        names = model.terms_of(j)
+        degrees = model.terms.degrees[model.coefficients[:, j] != 0.0]
+        counted = [f"{np.sum(degrees == d)} of degree {d}" for d in np.unique(degrees)]
+        found.append(", ".join(names) or "none" if len(names) <= MOST_NAMED else f"{len(names)}: {', '.join(counted)}")
+    return found
+
+
 def published(outcome: Outcome) -> dict[str, Any] | None:
     """Published entries against the fitted map, entry by entry."""
     known, model = outcome.study.oracle.published, outcome.model
@@ -242,6 +266,7 @@ def viewer_data(cases: list[tuple[str, Shape]]) -> str:
         {
             "label": label,
             "factor": exaggeration(shape),
+            "planar": is_planar(shape),
             "size": _short(1e3 * size(shape)),
             "anchors": _short(1e3 * shape.anchors) if len(shape.anchors) else [],
             "lines": [

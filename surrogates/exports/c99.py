@@ -11,10 +11,10 @@ import numpy as np
 from experiments.designs.base import check_count
 from experiments.settings import parameter
 
-from ..inversion import BOX_TOLERANCE, MAX_ITERATIONS, TARGET_TOLERANCE, affine_inverse
+from ..inversion import BOX_TOLERANCE, MAX_ITERATIONS, TARGET_TOLERANCE, affine_inverse, obstacle
 from . import c99_text as text
-from .base import about, check_prefix, number, plain
-from .c99_inverse_text import AFFINE, INVERSE, POLYNOMIAL
+from .base import WIDTH, about, check_prefix, number, plain
+from .c99_inverse_text import AFFINE_JACOBIAN, AFFINE_SEARCH, INVERSE, POLYNOMIAL_JACOBIAN, POLYNOMIAL_SEARCH
 
 if TYPE_CHECKING:
     from ..model import Surrogate
@@ -34,7 +34,8 @@ class C99:
 
     An affine model is inverted by one constant matrix. Any other by the Gauss–Newton steps of
     :func:`surrogates.inversion.invert` from the centre of the domain, a bounded number of them;
-    unlike Python, the C does not search the domain's boundary where they fail, it refuses.
+    unlike Python, the C does not search the domain's boundary where they fail, it refuses. Where
+    there is an :func:`surrogates.inversion.obstacle`, the code has no inverse and says why.
 
     Parameters
     ----------
@@ -63,8 +64,7 @@ class C99:
         body = _affine(model) if model.is_affine else _polynomial(model)
         settings = {"steps": str(self.max_iterations), "still": number(STILL)}
         settings["rank"] = str(min(len(model.factors), len(model.responses)))
-        parts = (AFFINE if model.is_affine else POLYNOMIAL) + INVERSE
-        source = Template(text.SOURCE + parts).substitute(names, **_common(model), **body, **settings)
+        source = Template(_parts(model)).substitute(names, **_common(model), **body, **settings)
         return {f"{prefix}.h": _header(model, names, settings), f"{prefix}.c": source}
 
 
@@ -72,6 +72,9 @@ def _header(model: "Surrogate", names: dict[str, str], settings: dict[str, str])
     unique = model.is_affine and len(model.factors) <= len(model.responses) and affine_inverse(model).condition < np.inf
     several = "" if unique else text.SEVERAL_NOTE
     note = Template(text.AFFINE_NOTE if model.is_affine else text.POLYNOMIAL_NOTE)
+    against = obstacle(model)
+    example = text.EXAMPLE_WITHOUT_INVERSE if against else text.EXAMPLE_WITH_INVERSE
+    inverse = Template(text.WITHOUT_INVERSE if against else text.WITH_INVERSE)
     return Template(text.HEADER).substitute(
         names,
         n=str(len(model.factors)),
@@ -80,9 +83,22 @@ def _header(model: "Surrogate", names: dict[str, str], settings: dict[str, str])
         centre=", ".join(number(c) for c in model.factors.centre),
         factor_indices=_indices(f"{names['P']}_FACTOR", model.factors.names),
         response_indices=_indices(f"{names['P']}_RESPONSE", tuple(r.name for r in model.responses)),
-        inverse_note=note.substitute(settings, several=several),
-        accuracy=f"{TARGET_TOLERANCE:g}",
+        example=Template(example).substitute(names),
+        inverse=inverse.substitute(
+            names,
+            obstacle=textwrap.indent(textwrap.fill(f"There is no inverse: {against}.", WIDTH), " * "),
+            inverse_note=note.substitute(settings, several=several),
+            accuracy=f"{TARGET_TOLERANCE:g}",
+        ),
     )
+
+
+def _parts(model: "Surrogate") -> str:
+    """Templates of the source: what only the inverse needs is left out with it."""
+    jacobian, search = (AFFINE_JACOBIAN, AFFINE_SEARCH) if model.is_affine else (POLYNOMIAL_JACOBIAN, POLYNOMIAL_SEARCH)
+    if obstacle(model):
+        return text.SOURCE + text.FORWARD + jacobian
+    return text.SOURCE + text.CHECK + text.FORWARD + jacobian + search + INVERSE
 
 
 def _check_locals(model: "Surrogate", prefix: str) -> None:

@@ -1,6 +1,6 @@
 """The fixed text of the C99 export's Jacobian and search for each kind of model, and the inverse that ends both."""
 
-AFFINE = """
+AFFINE_JACOBIAN = """
 int ${p}_jacobian(const double settings[${P}_N_FACTORS],
     double jacobian[${P}_N_RESPONSES][${P}_N_FACTORS])
 {
@@ -12,7 +12,9 @@ int ${p}_jacobian(const double settings[${P}_N_FACTORS],
 $slope
     return status;
 }
+"""
 
+AFFINE_SEARCH = """
 /* As the inverse, but writes what it tried whatever the status. */
 static int ${p}_search(const double responses[${P}_N_RESPONSES], double settings[${P}_N_FACTORS])
 {
@@ -26,7 +28,7 @@ $inverse
 }
 """
 
-POLYNOMIAL = """
+POLYNOMIAL_JACOBIAN = """
 /* d response / d coded setting at coded settings. */
 static void ${p}_slope(const double coded[${P}_N_FACTORS],
     double slope[${P}_N_RESPONSES][${P}_N_FACTORS])
@@ -52,7 +54,9 @@ int ${p}_jacobian(const double settings[${P}_N_FACTORS],
     }
     return status;
 }
+"""
 
+POLYNOMIAL_SEARCH = """
 /*
  * The shortest step with slope * step = miss, by Gram-Schmidt on the rows, the longest first.
  * Rows that depend on those before them are left out. Overwrites slope and miss.

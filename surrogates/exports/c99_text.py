@@ -14,9 +14,7 @@ $about
  *     double responses[${P}_N_RESPONSES];
  *
  *     if (${p}_forward(settings, responses) == ${P}_OK) {
- *         if (${p}_inverse(responses, settings) == ${P}_OK) {
- *             return 0;
- *         }
+$example
  *     }
  *     return 1;
  */
@@ -57,6 +55,15 @@ int ${p}_forward(const double settings[${P}_N_FACTORS], double responses[${P}_N_
 int ${p}_jacobian(const double settings[${P}_N_FACTORS],
     double jacobian[${P}_N_RESPONSES][${P}_N_FACTORS]);
 
+$inverse
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* ${P}_H */
+"""
+
+WITH_INVERSE = """\
 /*
  * Settings that give the responses.
 $inverse_note
@@ -64,13 +71,21 @@ $inverse_note
  * of the most it can change. With any other status the settings are left as they were.
  */
 int ${p}_inverse(const double responses[${P}_N_RESPONSES], double settings[${P}_N_FACTORS]);
-
-#ifdef __cplusplus
-}
-#endif
-
-#endif /* ${P}_H */
 """
+
+WITHOUT_INVERSE = """\
+/*
+$obstacle
+ */
+"""
+
+EXAMPLE_WITH_INVERSE = """\
+ *         if (${p}_inverse(responses, settings) == ${P}_OK) {
+ *             return 0;
+ *         }"""
+
+EXAMPLE_WITHOUT_INVERSE = """\
+ *         return 0;"""
 
 AFFINE_NOTE = """\
  * Closed form, always the same time.$several"""
@@ -132,7 +147,9 @@ static void ${p}_evaluate(const double coded[${P}_N_FACTORS], double responses[$
 {
 $polynomials
 }
+"""
 
+CHECK = """
 /* Whether settings answer for the responses. If they do, rounding beyond the ranges is taken off them. */
 static int ${p}_check(const double responses[${P}_N_RESPONSES], double settings[${P}_N_FACTORS])
 {
@@ -157,7 +174,9 @@ static int ${p}_check(const double responses[${P}_N_RESPONSES], double settings[
     }
     return ${P}_OK;
 }
+"""
 
+FORWARD = """
 int ${p}_inside(const double settings[${P}_N_FACTORS])
 {
     double coded[${P}_N_FACTORS];

@@ -78,7 +78,22 @@ class Unreachable(Counted):
         return float(np.exp(point[A])), float(np.exp(-point[A]))
 
 
-OURS: tuple[type[Oracle], ...] = (Counted, OneStill, AllStill, Unreachable)
+@dataclass(frozen=True)
+class Crowded(Counted):
+    """Four responses that follow from three factors, one of them along a curve."""
+
+    name: ClassVar[str] = "crowded"
+
+    @property
+    def responses(self) -> tuple[Response, ...]:
+        return *super().responses, Response("w", "N"), Response("t", "1")
+
+    def respond(self, point: np.ndarray) -> tuple[float, ...]:
+        a, b, c, _ = point
+        return *super().respond(point), a + c, a * b
+
+
+OURS: tuple[type[Oracle], ...] = (Counted, OneStill, AllStill, Unreachable, Crowded)
 
 
 def forget() -> None:

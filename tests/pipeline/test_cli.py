@@ -500,6 +500,23 @@ class TestInvert:
         assert float(refusal["nearest_x[m]"]) == pytest.approx(115.1e-6, rel=2e-3)
         assert err.startswith("flexdoce: 1 of 2 targets are out of reach and were refused")
 
+    def test_a_model_without_an_inverse_is_refused_with_the_reason(self, counted, table, tmp_path, answered, refused):
+        config = tmp_path / "crowded.toml"
+        config.write_text(config_text("crowded"), encoding="utf-8")
+        out, _ = answered("run", config, "--out", tmp_path / "out", *SET_SMALL)
+        text = " ".join(out.split())
+        assert "Inverse: none; 4 responses follow from 3 factors, so that they cannot be chosen independently" in text
+        assert "Round trip" not in text
+        report = " ".join((tmp_path / "out" / "report.html").read_text(encoding="utf-8").split())
+        assert "it has no inverse: 4 responses follow from 3 factors" in report
+        assert "No responses were inverted and confirmed on the oracle" in report
+        assert "model.invert(Y) " not in report
+        assert "inversion/" not in report
+        assert "The proof that matters" not in report
+        said = refused("invert", tmp_path / "out" / "model.json", table("u,v,w,t\n1,1,1,1\n"))
+        assert "model.json has no inverse: 4 responses follow from 3 factors" in said
+        answered("report", tmp_path / "out")
+
     def test_a_target_at_the_end_of_float64_is_refused_with_a_nearest_that_is_as_near(self, linear, table, answered):
         text = "x,y,z,theta_x,theta_y,theta_z\n1,0,0,0,0,0\n1e300,0,0,0,0,0\n"
         with warnings.catch_warnings():

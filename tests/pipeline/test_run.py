@@ -393,6 +393,38 @@ class TestEdges:
         assert again.round_trip.n_refused == 20
         assert len(again.round_trip.answers) == 0
 
+    def test_more_responses_than_factors_are_not_inverted(self, study, counted):
+        """A stage that could only refuse is left out, and with it its folder and the inverse of the code."""
+        outcome = study(oracle="crowded")
+        assert outcome.round_trip is None
+        assert outcome.obstacle.startswith("4 responses follow from 3 factors")
+        paid = sum(len(runs) for runs in (outcome.screening_runs, outcome.fit_runs, outcome.validation_runs))
+        assert len(counted.asked) <= paid
+        assert not (outcome.path / "inversion").exists()
+        assert "inversion" not in outcome.seconds
+        assert all(e.max_relative < 1e-9 for e in outcome.model.validation)
+        assert outcome.obstacle in outcome.model.certificate.reason
+        assert "study_inverse" not in (outcome.path / "exports" / "c99" / "study.h").read_text(encoding="ascii")
+        again = read_run(outcome.path)
+        assert again.round_trip is None
+        assert again.model.validation == outcome.model.validation
+
+    def test_an_inversion_left_over_from_before_is_removed(self, study):
+        outcome = study(oracle="crowded")
+        (outcome.path / "inversion").mkdir()
+        (outcome.path / "inversion" / "runs.csv").write_text("old")
+        study(oracle="crowded")
+        assert not (outcome.path / "inversion").exists()
+
+    def test_what_is_not_inverted_is_not_certified(self, study):
+        outcome = study(oracle="crowded", overrides=["require.certified_inverse=true"])
+        assert outcome.shortfalls == (f"the inverse is not certified (verdict: undecided; {outcome.obstacle})",)
+
+    def test_more_affine_responses_than_factors_are_inverted(self, study):
+        """On a line through the oracle's own answers the closed form is exact."""
+        outcome = study(oracle="one_still", overrides=["fit.degree=1"])
+        assert outcome.round_trip is not None
+
     def test_shortfalls_are_told_after_everything_is_written(self, study):
         outcome = study(overrides=["require.max_relative_error=1e-300"])
         assert [s.split(":")[0] for s in outcome.shortfalls] == ["u", "v"]

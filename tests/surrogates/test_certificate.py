@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from surrogates import Verdict, certify
+from surrogates import Verdict, certify, obstacle
 from tests.surrogates.cases import NONLINEAR, block_map, constant, hexflex_like, overdetermined, surrogate, unit_box
 
 
@@ -77,6 +77,8 @@ def test_a_nonlinear_model_is_undecided_never_certified(name):
     assert certificate.verdict is Verdict.UNDECIDED
     assert certificate.condition is None
     assert certificate.method == "none"
+    against = obstacle(NONLINEAR[name]())
+    assert certificate.reason.endswith(f"it has no inverse: {against}" if against else "checked against the model")
 
 
 def test_claim_names_the_domain():

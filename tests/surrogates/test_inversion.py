@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import minimize
 
-from surrogates import InversionStatus, affine_inverse
+from surrogates import InversionStatus, affine_inverse, obstacle
 from tests.surrogates.cases import (
     AFFINE,
     ALL,
@@ -214,6 +214,34 @@ def test_affine_inverse_condition_is_of_coded_factors_and_scaled_responses():
 def test_a_nonlinear_model_has_no_closed_form(name):
     with pytest.raises(ValueError, match="only an affine model has a closed-form inverse"):
         affine_inverse(NONLINEAR[name]())
+
+
+# --- what stands in the way of an inverse -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_only_a_curved_model_of_more_responses_than_factors_has_an_obstacle(name):
+    against = obstacle(ALL[name]())
+    assert bool(against) == (name == "more_responses")
+    assert against in (
+        "",
+        "3 responses follow from 2 factors, so that they cannot be chosen independently of each other",
+    )
+
+
+@pytest.mark.parametrize(
+    ("terms", "rows", "counts"),
+    [
+        (["f0", "f0^2"], [[1, 1], [2, 0]], "2 responses follow from 1 factor"),  # f1 and f2 do not act
+        (["1", "f0", "f0^2"], [[1, 1, 1], [2, 0, 0], [3, 0, 0]], ""),  # two responses do not move
+        (["f0", "f1", "f0:f1"], [[1, 0, 0], [0, 1, 0]], ""),  # no response uses the curved term: yet it is no obstacle
+        (["f0", "f1", "f0:f1"], [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "3 responses follow from 2 factors"),
+    ],
+)
+def test_an_obstacle_counts_what_moves_and_what_acts(terms, rows, counts):
+    against = obstacle(surrogate(unit_box(3), terms, np.array(rows, dtype=float)))
+    assert against.startswith(counts)
+    assert bool(against) == bool(counts)
 
 
 # --- misuse -----------------------------------------------------------------------------------------------------------
