@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from experiments.fea import Frame, Load, Material, Member, Motion, RigidBody, Support, factorise, load_array, rectangle
 from experiments.fea.arrays import frame_arrays
-from experiments.fea.linear import motion_array
+from experiments.fea.loads import motion_array
 
 STEEL = Material(210e9, 0.3)
 LEAF = rectangle(0.01, 0.001)

@@ -26,7 +26,7 @@ from experiments.fea import (
     load_array,
     rectangle,
 )
-from experiments.fea.linear import motion_array
+from experiments.fea.loads import motion_array
 from experiments.fea.stress import Fibres, bending_stress, normal_stress
 
 STEEL = Material(young=207e9, poisson=0.29)

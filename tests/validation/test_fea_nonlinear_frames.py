@@ -85,7 +85,7 @@ def actions(frame: Frame, n_cases: int, size: float = 1.0) -> tuple[Floats, Floa
         loads[:, frame.index(node)] = size * rng.normal(size=(n_cases, 6)) * [0.4, 0.4, 0.4, 0.1, 0.1, 0.1]
     for node in ("arm", "n4"):
         followers[:, frame.index(node)] = size * rng.normal(size=(n_cases, 6)) * [0.3, 0.3, 0.3, 0.1, 0.1, 0.1]
-    motions[:, frame.index("foot"), :3] = size * rng.uniform(-0.1, 0.1, (n_cases, 3))
+    motions[:, frame.index("foot"), :3] = size * rng.uniform(-0.01, 0.01, (n_cases, 3))
     return loads, motions, followers
 
 
