@@ -17,7 +17,7 @@ from .processes import apart, cpu
 MEMBERS = (8, 32, 128)
 STEPS = (4, 8, 16, 32, 64)
 POINTS = (10_000, 100_000, 1_000_000)
-LOADS = (0.2, 5.0)
+LOADS = (0.2, 1.0)
 BATCH, FEW = 1024, 256
 
 
