@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from .conclusion import Conclusion, conclude
 from .condensed import Problem, State, Topology
-from .newton import CONVERGED, EXACT, begin, march
+from .newton import CONVERGED, EXACT, begin, evaluate, march
 
-MOST_AT_ONCE, MOST_IN_STEPS = 16, 4000
+MOST_AT_ONCE, MOST_IN_STEPS = 16, 1500
 """Newton corrections after which a chunk is given up."""
 
 ASTRAY = 0.25
@@ -62,8 +62,20 @@ class Settled(NamedTuple):
 
     def reasons(self, only_stable: bool) -> tuple[str, ...]:
         """Why a point has no answer; empty where it has."""
-        why = zip(self.is_sound(only_stable), self.arrived, self.reached, self.unstable, self.residual, strict=True)
-        return tuple("" if sound else _reason(a, r, u, left, only_stable) for sound, a, r, u, left in why)
+        sound = self.is_sound(only_stable)
+        return tuple("" if fine else self._reason(i, only_stable) for i, fine in enumerate(sound))
+
+    def _reason(self, i: int, only_stable: bool) -> str:
+        if not self.arrived[i]:
+            found = f"no equilibrium was found beyond {self.reached[i]:.1%} of the load"
+            if self.iterations[i] > MOST_IN_STEPS:
+                return f"{found} in {MOST_IN_STEPS} corrections: load it less, or follow the path"
+            return f"{found}: it snaps, buckles or is out of reach there; load it less, or follow the path"
+        if self.unstable[i] and only_stable:
+            modes = "one mode" if self.unstable[i] == 1 else f"{self.unstable[i]} modes"
+            return f"the equilibrium at the full load is unstable in {modes}: the mechanism has buckled; load it less"
+        left = f"a residual of {self.residual[i]:.1g} is left, more than {EXACT:g}"
+        return f"{left}: its stiffnesses are too uneven for float64"
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,41 +95,32 @@ class Kernel:
         hard = taken(problem, rows)
         far = np.abs(hard.motion).max(axis=(0, 1), initial=0.0)
         stride = np.minimum(0.5, TURN / np.maximum(far, TURN)) + np.zeros(n_points)
+        stride[len(chosen) :] = 0.0
         second = self._tried(hard, view, stride, True, MOST_IN_STEPS)
         second = second._replace(iterations=first.iterations[rows] + second.iterations)
         return jax.tree.map(lambda a, b: _replaced(a, chosen, b), first, second)
 
     def _tried(self, problem: Problem, view: View, stride: NDArray[np.float64], in_steps: bool, most: int) -> Settled:
-        found = _compiled(self.topology, view)(problem, stride, np.array(in_steps), np.array(most))
+        found = _compiled(self.topology, view, in_steps, most)(problem, stride)
         return Settled(*jax.tree.map(np.asarray, found))
 
 
 @lru_cache(maxsize=32)
-def _compiled(topology: Topology, view: View) -> Any:
-    def from_rest(problem: Problem, stride: Array, in_steps: Array, most: Array) -> Settled:
+def _compiled(topology: Topology, view: View, in_steps: bool, most: int) -> Any:
+    def from_rest(problem: Problem, stride: Array) -> Settled:
         found, last = march(topology, problem, begin(topology, problem, stride), in_steps, most)
+        if in_steps:  # Stability is judged alike, however a point was reached.
+            _, last = evaluate(topology, problem, found.state, found.target, exactly=False)
         worth = conclude(topology, problem, found.state, found.outset, last)
         arrived = found.status == CONVERGED
         unstable = jnp.where(arrived, worth.unstable, 0)
         seen = view(topology, problem, found.state, worth)
         return Settled(seen, arrived, found.done, worth.residual, worth.astray, unstable, found.iterations)
 
-    def blockwise(problem: Problem, stride: Array, in_steps: Array, most: Array) -> Settled:
-        return in_blocks(lambda p, s: from_rest(p, s, in_steps, most), topology.space.block, problem, stride)
+    def blockwise(problem: Problem, stride: Array) -> Settled:
+        return in_blocks(from_rest, topology.space.block, problem, stride)
 
     return jax.jit(blockwise)
-
-
-def _reason(arrived: bool, reached: float, unstable: int, residual: float, only_stable: bool) -> str:
-    if not arrived:
-        return (
-            f"no equilibrium was found beyond {reached:.1%} of the load: it snaps, buckles or is out of reach there; "
-            "load it less, or follow the path"
-        )
-    if unstable and only_stable:
-        modes = "one mode" if unstable == 1 else f"{unstable} modes"
-        return f"the equilibrium at the full load is unstable in {modes}: the mechanism has buckled; load it less"
-    return f"a residual of {residual:.1g} is left, more than {EXACT:g}: its stiffnesses are too uneven for float64"
 
 
 def in_blocks(function: Callable[..., Any], size: int, *given: Any) -> Any:

@@ -15,6 +15,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from .condensed import Problem, State, Topology
+from .flexibility import exact
 from .rods import Along
 from .tangent import Residual, Step, residual, step, tangent
 
@@ -27,7 +28,7 @@ AIM, EXACT = 1e-10, 1e-8
 """What may be left undone; and, where rounding does not let it become that small, what must not be exceeded."""
 
 CONTRACTION = 0.5
-"""Corrections that shrink less than this end the attempt."""
+"""Corrections that shrink less than this end the attempt; in steps the first two are judged by their growth alone."""
 
 EASE = 0.1
 """Corrections that shrink more than this let the next step be longer."""
@@ -96,18 +97,21 @@ class March(NamedTuple):
 
 
 def begin(topology: Topology, problem: Problem, stride: Array) -> March:
-    """At rest, aiming at the fraction `stride` of the load, shape (n_points,)."""
+    """At rest, aiming at the fraction `stride` of the load, shape (n_points,); a point of stride zero stays there."""
     zero = jnp.zeros_like(stride)
     n_members = len(topology.start)
     wrench = jnp.zeros((topology.space.size, n_members, len(stride)))
     state = State(wrench, problem.rest + zero)
     none = jnp.zeros(stride.shape, int)
+    status = jnp.where(stride > 0, ACTIVE, FAILED)
     outset = jnp.zeros((topology.space.size, topology.n_blocks, len(stride)))
-    return March(state, state, zero, stride, stride, zero, zero, none, none, none, outset)
+    return March(state, state, zero, stride, stride, zero, zero, none, none, status, outset)
 
 
-def march(topology: Topology, problem: Problem, start: March, in_steps: Array, most: Array) -> tuple[March, Evaluated]:
+def march(topology: Topology, problem: Problem, start: March, in_steps: bool, most: int) -> tuple[March, Evaluated]:
     """Go on until no point is active, or `most` corrections are made; unless `in_steps`, the first attempt decides.
+
+    In steps, tangents are exact: the points that come to that are the hard ones.
 
     A point is done when what an evaluation finds undone is small enough, and is left as it is, so that
     what the last evaluation found belongs to the states that are handed out.
@@ -119,22 +123,30 @@ def march(topology: Topology, problem: Problem, start: March, in_steps: Array, m
 
     def correct(carry: tuple[March, Evaluated, Array]) -> tuple[March, Evaluated, Array]:
         now, _, count = carry
-        taken, found = evaluate(topology, problem, now.state, now.target)
+        taken, found = evaluate(topology, problem, now.state, now.target, in_steps)
         motion, relative = taken.motion[:, 0], taken.relative[:, 0]
         moved = State(now.state.wrench + taken.wrench[:, 0], topology.space.moved(now.state.pose, motion))
         outset = jnp.where(now.iterations == 0, motion, now.outset)
         size = jnp.maximum(largest(motion), largest(relative))
         return _next(now._replace(outset=outset), moved, size, found.undone, in_steps), found, count + 1
 
-    shape = jax.eval_shape(lambda: evaluate(topology, problem, start.state, start.target)[1])
+    shape = jax.eval_shape(lambda: evaluate(topology, problem, start.state, start.target, in_steps)[1])
     nothing = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), shape)
     return jax.lax.while_loop(go_on, correct, (start, nothing, jnp.array(0)))[:2]
 
 
-def evaluate(topology: Topology, problem: Problem, state: State, level: Array) -> tuple[Step, Evaluated]:
-    """A step of two columns, Newton's correction and the change per fraction of the load, and what was found."""
+def evaluate(
+    topology: Topology, problem: Problem, state: State, level: Array, exactly: bool
+) -> tuple[Step, Evaluated]:
+    """A step of two columns, Newton's correction and the change per fraction of the load, and what was found.
+
+    With the flexibility that comes along with the law or, `exactly`, with the derivative of the law.
+    """
     space, free = topology.space, slice(topology.n_free)
     law, twist, met = space.law(state.wrench, problem.rods, topology.n_steps)
+    if exactly:
+        _, twist = exact(topology, problem.rods, state.wrench)
+        met = met._replace(twist=met.twist.at[:, :, -1].set(twist))
     left = residual(topology, problem, state, level, law)
     slope = tangent(topology, problem, state, level, twist)
     dead, _ = space.dead(state.pose[:, free], problem.dead[:, free])
@@ -161,7 +173,7 @@ def largest(values: Array) -> Array:
     return jnp.max(jnp.abs(values), axis=tuple(range(values.ndim - 1)), initial=0.0)
 
 
-def _next(now: March, state: State, size: Array, undone: Array, in_steps: Array) -> March:
+def _next(now: March, state: State, size: Array, undone: Array, in_steps: bool) -> March:
     """What an evaluation, and the correction that it gives, mean for each point."""
     active = now.status == ACTIVE
     exact = (undone < AIM) | ((undone < EXACT) & (now.tries >= PATIENCE))
@@ -170,7 +182,8 @@ def _next(now: March, state: State, size: Array, undone: Array, in_steps: Array)
     again = tries > 1
     contraction = size / jnp.where(again, now.size, 1.0)
     first = jnp.where(tries == 2, contraction, now.first)
-    bad = ~jnp.isfinite(size) | (size > MOST) | (again & (contraction > CONTRACTION) & (size > SMALL))
+    most = jnp.where(tries == 2, 1.0, CONTRACTION) if in_steps else CONTRACTION
+    bad = ~jnp.isfinite(size) | (size > MOST) | (again & (contraction > most) & (size > SMALL))
     between = active & ~bad & (size < SMALL) & (now.target < 1.0)
     back = active & ~final & ~between & (bad | (tries > PATIENCE))
     arrived = final | between
@@ -180,7 +193,7 @@ def _next(now: March, state: State, size: Array, undone: Array, in_steps: Array)
     stride = jnp.where(between, longer, jnp.where(back, now.stride / 2, now.stride))
     done = jnp.where(arrived, now.target, now.done)
     status = jnp.where(final, CONVERGED, now.status)
-    status = jnp.where(back & (~in_steps | (stride < SHORTEST)), FAILED, status)
+    status = jnp.where(back & ((stride < SHORTEST) if in_steps else True), FAILED, status)
     anew = between | back
     return now._replace(
         state=_where(back, now.base, state),

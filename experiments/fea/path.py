@@ -159,13 +159,19 @@ class _Walk:
         return None, False, None
 
     def _arrived(self, state: State, level: float, arc: float, tries: int, normal: Array) -> PathPoint:
-        """The point of a state that is nearly there; the last corrections are made at a constant level."""
+        """The point of a state that is nearly there; the last corrections are made at a constant level.
+
+        At a limit point that level may be out of reach, and the corrections lead away: then they are not made.
+        """
         taken, found = self._evaluate(self.problem, state, jnp.full(1, level))
         for _ in range(PATIENCE):
             if not found.undone[0] > AIM:
                 break
-            state = self._moved(state, taken, jnp.array([1.0, 0.0]))
-            taken, found = self._evaluate(self.problem, state, jnp.full(1, level))
+            moved = self._moved(state, taken, jnp.array([1.0, 0.0]))
+            next_taken, next_found = self._evaluate(self.problem, moved, jnp.full(1, level))
+            if not next_found.undone[0] < found.undone[0]:
+                break
+            state, taken, found = moved, next_taken, next_found
         way = taken.motion[:, 1]
         slope = float(np.sign(jnp.vdot(normal, way))) / _norm(way)
         worth = self._conclude(self.problem, state, found)
@@ -209,7 +215,7 @@ def _compiled(topology: Topology) -> tuple[Any, Any, Any]:
         return conclude(topology, problem, state, jnp.zeros_like(found.direction), found)
 
     def evaluated(problem: Problem, state: State, level: Array) -> tuple[Step, Evaluated]:
-        return evaluate(topology, problem, state, level)
+        return evaluate(topology, problem, state, level, exactly=True)
 
     return jax.jit(evaluated), jax.jit(concluded), jax.jit(moved)
 

@@ -115,7 +115,7 @@ def rods(arrays: FrameArrays, space: Space, unit: Units, geometry: Geometry, sha
         bending / (p.young * p.second_moment_y),
         bending / (p.young * p.second_moment_z),
     ]
-    start = quaternion_of(jnp.swapaxes(shape.axes, 0, 1), _branch(arrays))
+    start = quaternion_of(jnp.swapaxes(shape.axes, 0, 1))
     back = conjugate(tuple(product(tuple(start), tuple(quaternion(shape.bend)))))
     end = [*rotated(back, tuple(-offsets[1])), *back]
     strain = jnp.stack([ones, 0 * ones, 0 * ones, *(shape.bend / length)])
@@ -140,12 +140,6 @@ def _planar(shape, offsets: list[Array], length: Array, give: list[Array], ones:
 
 def _stacked(parts: list[Array], ones: Array) -> Array:
     return jnp.stack([part * ones for part in parts])
-
-
-def _branch(arrays: FrameArrays) -> NDArray[np.int64]:
-    """Which component of each member's quaternion is largest at rest, so that its formula can be differentiated."""
-    xx, yy, zz = (arrays.axes[:, i, i] for i in range(3))
-    return np.argmax([1 + xx + yy + zz, 1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz], axis=0)
 
 
 def _inverse(shear_area: Array) -> Array:

@@ -15,9 +15,9 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
-from .blocks import multiply
 from .conclusion import Conclusion
 from .condensed import Problem, State, Topology
+from .flexibility import exact
 from .scaling import Units
 from .tangent import residual, step, tangent
 
@@ -98,7 +98,7 @@ def rates(topology: Topology, units: Units, read: Read, problem: Problem, state:
     """Change of what is read per unit of each direction, (n_responses, m, n_points), at equilibria."""
     space, free = topology.space, slice(topology.n_free)
     level = jnp.ones(state.wrench.shape[-1])
-    law, twist = _exact(topology, problem, state.wrench)
+    law, twist = exact(topology, problem.rods, state.wrench)
     slope = tangent(topology, problem, state, level, twist)
 
     def changed(direction: Directions) -> Problem:
@@ -153,18 +153,3 @@ def in_si(topology: Topology, units: Units, motion: Array, force: Array, interna
         return full * scale.reshape(6, *(1,) * (values.ndim - 1))
 
     return Answer(real(motion, lengths), real(force, forces), real(internal, forces))
-
-
-def _exact(topology: Topology, problem: Problem, wrench: Array) -> tuple[Array, Array]:
-    """Where the members put their ends, and their flexibility about the starts, by differentiation of the law."""
-    space = topology.space
-
-    def law(wrench: Array) -> Array:
-        return space.law(wrench, problem.rods, topology.n_steps)[0]
-
-    def column(direction: Array) -> tuple[Array, Array]:
-        return jax.jvp(law, (wrench,), (jnp.broadcast_to(direction.reshape(-1, 1, 1), wrench.shape),))
-
-    pose, change = jax.vmap(column, out_axes=(None, 1))(jnp.eye(space.size))
-    own = jax.vmap(space.spin, in_axes=(None, 1), out_axes=1)(pose, change)
-    return pose, multiply(space.shift(pose, jnp.zeros_like(pose)), own)

@@ -9,7 +9,6 @@ from typing import ClassVar
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
 from .blocks import apply, four, multiply, skew
 from .rods import Along, Components, Rods, along, even_series, integrate
@@ -203,8 +202,8 @@ def rotation_vector(q: Array) -> Array:
     return factor * q[1:]
 
 
-def quaternion_of(matrix: Array, largest: NDArray[np.int64]) -> Array:
-    """Unit quaternion of rotation matrices (3, 3, n, ...), given which component is largest of each, (n,).
+def quaternion_of(matrix: Array) -> Array:
+    """Unit quaternion of rotation matrices, (3, 3, ...) to (4, ...); differentiable at any rotation.
 
     Source: Shepperd, J. Guidance and Control 1 (1978), 223–224.
     """
@@ -219,7 +218,10 @@ def quaternion_of(matrix: Array, largest: NDArray[np.int64]) -> Array:
         (across[2], zx, yz, one - xx - yy + zz),
     ]
     rows = jnp.stack([jnp.stack(row) for row in table])  # each is 4 q_k q
-    row = rows[largest, :, np.arange(len(largest))].swapaxes(0, 1)
+    row, size = rows[0], table[0][0]
+    for k in (1, 2, 3):
+        larger = table[k][k] > size
+        row, size = jnp.where(larger, rows[k], row), jnp.where(larger, table[k][k], size)
     return row / jnp.sqrt((row * row).sum(0))
 
 
