@@ -33,7 +33,10 @@ Two solvers take it from there: :func:`factorise` for small displacements, :func
 :mod:`.newton`         Newton's method at one go or in load steps
 :mod:`.conclusion`     what a converged state is worth, and its stability
 :mod:`.kernel`         the compiled whole
+:mod:`.flexibility`    of members, as the derivative of their law
 :mod:`.sensitivity`    what is read off, and its derivatives
+:mod:`.directions`     along which these are taken
+:mod:`.parameters`     geometry as a function of what a frame is built from
 :mod:`.path`           paths past limit points
 :mod:`.equilibria`     answers in SI units
 :mod:`.nonlinear`      condense once, solve many cases
@@ -62,6 +65,7 @@ from .linear import LinearSolver, Solution, factorise
 from .loads import load_array, motion_array
 from .model import Frame, Load, Material, Member, Motion, RigidBody, Support
 from .nonlinear import NonlinearSolver, condense
+from .parameters import geometry_rates
 from .results import Centreline, centrelines
 from .sections import Section, circle, rectangle
 from .stress import PeakStress
@@ -86,6 +90,7 @@ __all__ = [
     "circle",
     "condense",
     "factorise",
+    "geometry_rates",
     "load_array",
     "motion_array",
     "rectangle",

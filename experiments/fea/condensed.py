@@ -5,7 +5,7 @@ EI / L, and motions of L or radians.
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jax import Array
@@ -74,6 +74,8 @@ class Problem(NamedTuple):
         Loads of constant direction, and loads that turn with their body.
     motion : Array, shape (D, n_free, ...)
         Prescribed motions, zero where none is.
+    along : pytree of Array
+        What the view that is handed out needs beside; the solver does not look at it.
     """
 
     rods: Rods
@@ -81,6 +83,7 @@ class Problem(NamedTuple):
     dead: Array
     follower: Array
     motion: Array
+    along: Any = ()
 
 
 class State(NamedTuple):

@@ -135,9 +135,7 @@ def march(topology: Topology, problem: Problem, start: March, in_steps: bool, mo
     return jax.lax.while_loop(go_on, correct, (start, nothing, jnp.array(0)))[:2]
 
 
-def evaluate(
-    topology: Topology, problem: Problem, state: State, level: Array, exactly: bool
-) -> tuple[Step, Evaluated]:
+def evaluate(topology: Topology, problem: Problem, state: State, level: Array, exactly: bool) -> tuple[Step, Evaluated]:
     """A step of two columns, Newton's correction and the change per fraction of the load, and what was found.
 
     With the flexibility that comes along with the law or, `exactly`, with the derivative of the law.

@@ -23,6 +23,7 @@ from . import scaling
 from .arrays import FrameArrays, frame_arrays
 from .blockloads import dead_loads, follower_loads, prescribed
 from .condensed import Problem, topology
+from .directions import Toward, directions
 from .equilibria import Described, Equilibria, Path, equilibria, everything, joined
 from .kernel import Kernel, Settled, View, taken
 from .loads import checked, checked_motions
@@ -34,7 +35,7 @@ from .planes import check_planar, check_rotations
 from .precision import in_float64
 from .rods import Rods
 from .scaling import Geometry, Units
-from .sensitivity import Frozen, Read, Reading, differentiating, reading
+from .sensitivity import Read, Reading, differentiating, reading
 from .spatial import Spatial
 
 Floats = NDArray[np.float64]
@@ -154,35 +155,39 @@ class NonlinearSolver:
         read: Read,
         loads: ArrayLike | None = None,
         motions: ArrayLike | None = None,
+        geometry: Geometry | None = None,
         *,
-        load_directions: ArrayLike,
-        motion_directions: ArrayLike,
+        load_directions: ArrayLike | None = None,
+        motion_directions: ArrayLike | None = None,
+        geometry_directions: Geometry | None = None,
     ) -> Floats:
-        """Derivatives of what `read` reads along m directions of the loads and the prescribed motions.
+        """Derivatives of what `read` reads along m directions of loads, prescribed motions, geometry and material.
 
         Parameters
         ----------
-        read, loads, motions
-            As for :meth:`read`.
-        load_directions, motion_directions : array-like, shape (m, n_nodes, 6)
+        read, loads, motions, geometry
+            As for :meth:`read`. What `read` holds constant, say a distance of fibres, stays constant.
+        load_directions, motion_directions : array-like, shape (m, n_nodes, 6), optional
+        geometry_directions : Geometry, optional
+            Changes of each array of a geometry, with m as first axis; :func:`.parameters.geometry_rates`
+            makes them from a function that builds the frame. Scalars and axes of 1 are repeated.
 
         Returns
         -------
         ndarray, shape (n_cases, n_values, m)
             NaN where a case has no stable equilibrium.
+
+        Raises
+        ------
+        ValueError
+            As :meth:`solve`, or if there is no direction, or not as many of each.
         """
         given = self._checked(loads, motions, None)
-        toward = self._checked(load_directions, motion_directions, None)
-        a, space, unit = self.arrays, self.kernel.topology.space, self.units
-        directions = (
-            np.moveaxis(dead_loads(a, space, unit, a.coordinates.T[..., None], toward[0]), -1, 0)[..., None],
-            np.zeros((len(toward[0]), space.size, a.n_blocks, 1)),
-            np.moveaxis(prescribed(a, space, unit, toward[1]), -1, 0)[..., None],
-        )
-        view = differentiating(read, unit, *map(Frozen, directions))
+        toward = self._toward(load_directions, motion_directions, geometry_directions)
+        view = differentiating(read, self.units)
 
         def solved(rows: NDArray[np.int64]) -> Floats:
-            settled, _ = self._settled(view, given, None, rows, True)
+            settled, _ = self._settled(view, given, geometry, rows, True, toward)
             return np.where(settled.is_sound(only_stable=True), settled.seen, np.nan).transpose(2, 0, 1)
 
         return np.concatenate(list(in_threads(solved, chunks(len(given[0])))))
@@ -235,12 +240,23 @@ class NonlinearSolver:
 
     @in_float64
     def _settled(
-        self, view: View, given: Given, geometry: Geometry | None, rows: NDArray[np.int64], only_stable: bool
+        self,
+        view: View,
+        given: Given,
+        geometry: Geometry | None,
+        rows: NDArray[np.int64],
+        only_stable: bool,
+        toward: Toward | None = None,
     ) -> tuple[Settled, Any]:
         """One chunk, filled up with its last case, and the centres of its sections at rest."""
         full = rows[np.minimum(np.arange(CHUNK), len(rows) - 1)]
         loads, motions, followers = (array[full] for array in given)
-        problem, centre = self.problem(loads, motions, followers, taken(geometry, full))
+        here = taken(geometry, full)
+        problem, centre = self.problem(loads, motions, followers, here)
+        if toward is not None:
+            at = scaling.geometry(self.arrays) if here is None else here
+            along = directions(self.arrays, self.kernel.topology, self.units, toward, at, loads)
+            problem = problem._replace(along=along)
         settled = self.kernel.settle(problem, view, only_stable)
         return taken(settled, np.arange(len(rows))), taken(centre, np.arange(len(rows)))
 
@@ -259,6 +275,21 @@ class NonlinearSolver:
             jnp.asarray(prescribed(a, space, unit, motions)),
         )
         return problem, centre
+
+    def _toward(self, loads: ArrayLike | None, motions: ArrayLike | None, geometry: Geometry | None) -> Toward:
+        """Directions as they are given, as many of each."""
+        parts = [part for part in (loads, motions, *jax.tree.leaves(geometry)) if np.ndim(part)]
+        if not parts:
+            raise ValueError(
+                "there is no direction: give load_directions, motion_directions or geometry_directions, "
+                "with the directions as first axis"
+            )
+        none = np.zeros((len(np.asarray(parts[0])), len(self.frame.nodes), 6))
+        given = self._checked(none if loads is None else loads, none if motions is None else motions, None)
+        wrong = [len(np.asarray(part)) for part in parts if len(np.asarray(part)) != len(none)]
+        if wrong:
+            raise ValueError(f"there are {len(none)} directions of one kind and {wrong[0]} of another: give as many")
+        return Toward(given[0], given[1], geometry)
 
     @cached_property
     def _condensed(self) -> Any:

@@ -1,4 +1,4 @@
-"""What is read off equilibria, and its derivatives with respect to loads and prescribed motions.
+"""What is read off equilibria, and its derivatives with respect to loads, prescribed motions and geometry.
 
 By the implicit function theorem: at an equilibrium the residual stays zero, so the state changes by a
 Newton step on the change of the residual. The tangent here is that of the law as it is integrated,
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from .conclusion import Conclusion
 from .condensed import Problem, State, Topology
 from .flexibility import exact
+from .rods import Rods
 from .scaling import Units
 from .tangent import residual, step, tangent
 
@@ -41,11 +42,16 @@ class Answer(NamedTuple):
 
 
 class Directions(NamedTuple):
-    """m directions in which loads and prescribed motions change; arrays as in :class:`.condensed.Problem`, m first."""
+    """m directions in which a problem changes; arrays as in :class:`.condensed.Problem`, m first.
+
+    Without `rods` and `rest` the members and the places of the bodies stay as they are.
+    """
 
     dead: Array
     follower: Array
     motion: Array
+    rods: Rods | None = None
+    rest: Array | None = None
 
 
 class Reading(NamedTuple):
@@ -69,27 +75,12 @@ Read = Callable[[Answer], Array]
 """From answers to responses, (n_responses, n_points); traceable."""
 
 
-class Frozen:
-    """An array that can be a key: equal where the numbers are."""
-
-    def __init__(self, values: NDArray[np.float64]) -> None:
-        self.values = values
-        self._key = (values.shape, values.tobytes())
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Frozen) and self._key == other._key
-
-    def __hash__(self) -> int:
-        return hash(self._key)
-
-
 @lru_cache(maxsize=32)
-def differentiating(read: Read, units: Units, *directions: Frozen) -> Any:
-    """The view of the solver that gives the derivatives of what `read` reads along `directions`."""
+def differentiating(read: Read, units: Units) -> Any:
+    """The view of the solver that gives the derivatives of what `read` reads along ``problem.along``."""
 
     def view(topology: Topology, problem: Problem, state: State, found: Conclusion) -> Array:
-        along = Directions(*(jnp.asarray(part.values) for part in directions))
-        return rates(topology, units, read, problem, state, along)
+        return rates(topology, units, read, problem, state, problem.along)
 
     return view
 
@@ -100,28 +91,45 @@ def rates(topology: Topology, units: Units, read: Read, problem: Problem, state:
     level = jnp.ones(state.wrench.shape[-1])
     law, twist = exact(topology, problem.rods, state.wrench)
     slope = tangent(topology, problem, state, level, twist)
+    given, along = _alike(problem, along, len(level))
 
-    def changed(direction: Directions) -> Problem:
-        return problem._replace(**direction._asdict())
+    def placed(given: Directions) -> Array:
+        """Poses of the blocks, those that cannot move where they are at rest."""
+        if given.rest is None:
+            return state.pose
+        return jnp.concatenate([state.pose[:, free], given.rest[:, topology.n_free :]], axis=1)
 
-    def left(given: Directions) -> tuple[Array, Array]:
-        found = residual(topology, changed(given), state, level, law)
-        return found.force[:, free], found.ahead
+    def left(given: Directions) -> tuple[Array, Array, Array]:
+        changed = _changed(problem, given)
+        ends = law if given.rods is None else space.law(state.wrench, given.rods, topology.n_steps)[0]
+        found = residual(topology, changed, State(state.wrench, placed(given)), level, ends)
+        return found.gap, found.force[:, free], found.ahead
 
-    def answer(state: State, given: Directions) -> Array:
-        return read(answers(topology, units, changed(given), state))
+    right = jax.vmap(lambda d: jax.jvp(left, (given,), (d,))[1], out_axes=1)(along)
+    taken = step(topology, slope, *right)
 
-    given = Directions(problem.dead, problem.follower, problem.motion)
-    along = Directions(*(jnp.broadcast_to(a, (len(a), *g.shape)) for a, g in zip(along, given, strict=True)))
-    forces, ahead = jax.vmap(lambda d: jax.jvp(left, (given,), (d,))[1], out_axes=1)(along)
-    gap = jnp.zeros((*forces.shape[:2], *state.wrench.shape[1:]))
-    taken = step(topology, slope, gap, forces, ahead)
+    def answer(motion: Array, wrench: Array, given: Directions) -> Array:
+        moved = State(wrench, space.moved(placed(given), motion))
+        return read(answers(topology, units, _changed(problem, given), moved))
 
     def rate(motion: Array, wrench: Array, direction: Directions) -> Array:
-        _, pose = jax.jvp(lambda m: space.moved(state.pose, m), (jnp.zeros_like(motion),), (motion,))
-        return jax.jvp(answer, (state, given), (State(wrench, pose), direction))[1]
+        at = (jnp.zeros_like(motion), state.wrench, given)
+        return jax.jvp(answer, at, (motion, wrench, direction))[1]
 
     return jax.vmap(rate, in_axes=(1, 1, 0), out_axes=1)(taken.motion, taken.wrench, along)
+
+
+def _alike(problem: Problem, along: Directions, n_points: int) -> tuple[Directions, Directions]:
+    """What changes, and its directions, with all points in both."""
+    given = Directions(problem.dead, problem.follower, problem.motion)
+    if along.rods is not None:
+        given = given._replace(rods=problem.rods, rest=problem.rest)
+    given = jax.tree.map(lambda g: jnp.broadcast_to(g, (*g.shape[:-1], n_points)), given)
+    return given, jax.tree.map(lambda a, g: jnp.broadcast_to(a, (len(a), *g.shape)), along, given)
+
+
+def _changed(problem: Problem, given: Directions) -> Problem:
+    return problem._replace(**{name: value for name, value in given._asdict().items() if value is not None})
 
 
 def answers(topology: Topology, units: Units, problem: Problem, state: State) -> Answer:

@@ -1,0 +1,180 @@
+"""Geometry as data: derivatives with respect to it, and frames that are turned far from where they were condensed."""
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from experiments import oracles
+from experiments.fea import (
+    Frame,
+    Load,
+    Material,
+    Member,
+    Motion,
+    RigidBody,
+    Support,
+    condense,
+    geometry_rates,
+    load_array,
+    motion_array,
+    rectangle,
+)
+from experiments.fea.arrays import frame_arrays
+from experiments.fea.scaling import geometry
+
+AT = {"length": 0.05, "rise": 0.01, "arm": 0.02, "thickness": 1e-3, "young": 70e9, "angle": 0.3}
+
+
+def build(length, rise, arm, thickness, young, angle):
+    """A driven lever on an arc and a leaf, turned in its plane; every number moves nodes, sections or materials."""
+    turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+    places = {
+        "ground": (0.0, 0.0, 0.0),
+        "tip": (length, rise, 0.0),
+        "hand": (length + arm, 2 * arm, 0.0),
+        "drive": (length + arm, rise - 0.04, 0.0),
+    }
+    nodes = {name: tuple((turn @ np.array(place)).tolist()) for name, place in places.items()}
+    section, material = rectangle(0.01, thickness), Material(young, 0.33)
+    members = [
+        Member("arc", "ground", "tip", section, material, through=tuple(turn @ (length / 2, rise / 2 + 0.008, 0))),
+        Member("leaf", "drive", "hand", section, material),
+    ]
+    bodies = [RigidBody("lever", "tip", ("hand",))]
+    return Frame(nodes, members, bodies, ["ground"], [Support("drive", ("x", "y", "rz"))])
+
+
+def read(answer):
+    """Pose of the lever, and the moment at the roots of both members."""
+    return jnp.concatenate([answer.motion[[0, 1, 5], 0], answer.internal[5, 0]])
+
+
+def values(frame):
+    loads = load_array(frame, [[Load("hand", (2.0, -1.0, 0.0), (0.0, 0.0, 0.02))], [Load("tip", (-1.0, 3.0, 0.0))]])
+    motions = motion_array(frame, [[Motion("drive", (1e-3, 5e-4, 0.0), (0.0, 0.0, 0.2))], []])
+    return loads, motions
+
+
+def differences(near, step):
+    """Central difference of the fourth order, from the values at −2, −1, 1 and 2 steps."""
+    return (near[0] - 8 * near[1] + 8 * near[2] - near[3]) / (12 * step)
+
+
+class TestDerivatives:
+    """Beside differences of solutions of the same compiled solver, handed other geometries."""
+
+    def test_of_a_planar_mechanism(self):
+        frame = build(*AT.values())
+        solver = condense(frame, planar=True, n_steps=4)
+        rates = geometry_rates(build, list(AT.values()))
+        found = solver.differentiate(read, *values(frame), geometry_directions=rates)
+        assert found.shape == (2, 5, len(AT))
+        for j, (name, at) in enumerate(AT.items()):
+            others = [build(**{**AT, name: at * (1 + 1e-3 * k)}) for k in (-2, -1, 1, 2)]
+            near = [solver.read(read, *values(frame), geometry(frame_arrays(other))).values for other in others]
+            expected = differences(near, 1e-3 * at)
+            assert_allclose(found[:, :, j], expected, rtol=0, atol=1e-7 * np.abs(expected).max(), err_msg=name)
+
+    def test_of_the_hexflex_whose_loaded_nodes_move(self):
+        names = ("length_1", "thickness", "bend_angle", "poisson", "load_radius")
+        oracle = oracles.get("hexflex", kinematics="nonlinear", n_steps=4)
+        force = load_array(oracle.frame, [[Load("T1", (0.7, -0.3, 0.5)), Load("T2", (0.0, 0.0, -0.9))]])
+        solver, at = condense(oracle.frame, n_steps=4), np.array([getattr(oracle, name) for name in names])
+
+        def platform(answer):
+            return answer.motion[:, solver.arrays.block[oracle.frame.index("centroid")]]
+
+        def built(*at):
+            return replace(oracle, **dict(zip(names, at, strict=True))).frame
+
+        rates = geometry_rates(built, at.tolist())
+        found = solver.differentiate(platform, force, geometry_directions=rates)
+        for j, name in enumerate(names):
+            step = 1e-3 * abs(at[j]) * np.eye(len(at))[j]
+            others = [geometry(frame_arrays(built(*(at + k * step).tolist()))) for k in (-2, -1, 1, 2)]
+            expected = differences([solver.read(platform, force, None, other).values for other in others], step[j])
+            assert_allclose(found[:, :, j], expected, rtol=0, atol=1e-6 * np.abs(expected).max(), err_msg=name)
+
+    def test_verification_cube_law_of_a_cantilever(self):
+        """u = 4 P L³ / (E w t³): d ln u / d ln (L, w, t, E) = 3, −1, −3, −1 (Gere, Mechanics of Materials, app. G)."""
+
+        def leaf(length, width, thickness, young):
+            section = rectangle(width, thickness)
+            slender = replace(section, shear_area_y=np.inf, shear_area_z=np.inf)
+            member = Member("leaf", "root", "tip", slender, Material(young, 0.3))
+            return Frame({"root": (0, 0, 0), "tip": (length, 0, 0)}, [member], clamps=["root"])
+
+        at = np.array([0.1, 0.01, 1e-3, 210e9])
+        frame = leaf(*at.tolist())
+        load = load_array(frame, [[Load("tip", (0.0, 0.0, 1e-6))]])
+        solver = condense(frame, n_steps=4)
+        rates = solver.differentiate(
+            lambda answer: answer.motion[2:3, 0], load, geometry_directions=geometry_rates(leaf, at.tolist())
+        )
+        assert_allclose(rates[0, 0] * at / solver.solve(load).at("tip")[0, 2], [3, -1, -3, -1], rtol=1e-9)
+
+    def test_several_kinds_at_once(self):
+        """A direction may change loads and geometry together: the derivatives add."""
+        frame = build(*AT.values())
+        solver, given = condense(frame, planar=True, n_steps=4), values(frame)
+        push = load_array(frame, [[Load("hand", (1.0, 0.0, 0.0))]])
+        rates = geometry_rates(lambda arm: build(**{**AT, "arm": arm}), [AT["arm"]])
+        both = solver.differentiate(read, *given, load_directions=push, geometry_directions=rates)
+        one = solver.differentiate(read, *given, load_directions=push)
+        other = solver.differentiate(read, *given, geometry_directions=rates)
+        assert_allclose(both, one + other, rtol=1e-9, atol=1e-12)
+
+
+class TestErrors:
+    def test_no_direction(self):
+        frame = build(*AT.values())
+        with pytest.raises(ValueError, match="there is no direction: give load_directions"):
+            condense(frame, planar=True).differentiate(read, *values(frame))
+
+    def test_not_as_many_of_each(self):
+        frame = build(*AT.values())
+        rates = geometry_rates(build, list(AT.values()))
+        with pytest.raises(ValueError, match="2 directions of one kind and 6 of another"):
+            condense(frame, planar=True).differentiate(
+                read, *values(frame), load_directions=values(frame)[0], geometry_directions=rates
+            )
+
+    def test_a_step_must_be_positive(self):
+        with pytest.raises(ValueError, match=r"a positive step for each of the 1 numbers, got \[0.0\]"):
+            geometry_rates(lambda angle: build(**{**AT, "angle": angle}), [0.0])
+
+    def test_what_joins_what_must_stay(self):
+        def changing(length):
+            return build(**{**AT, "length": length}) if length > 0.05 else build_other()
+
+        def build_other():
+            frame = build(*AT.values())
+            return replace(frame, members=[replace(m, name=f"{m.name}!") for m in frame.members])
+
+        with pytest.raises(ValueError, match="the numbers change what joins what"):
+            geometry_rates(changing, [0.05])
+
+
+def test_a_geometry_may_be_turned_far_from_the_frame():
+    """Cantilevers along other directions than that of the frame move as it does, seen from their own axes."""
+    towards = np.array([(-1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -0.6, 0.8), (-0.6, 0.0, -0.8)])
+
+    def leaf(direction):
+        member = Member("m", "root", "tip", rectangle(0.01, 0.001), Material(70e9, 0.3), (0.0, 1.0, 0.0))
+        return Frame({"root": (0, 0, 0), "tip": tuple(0.1 * np.array(direction))}, [member], clamps=["root"])
+
+    first, force = leaf((1.0, 0.0, 0.0)), np.array([1.0, 2.0, 3.0])
+    others = [geometry(frame_arrays(leaf(direction))) for direction in towards.tolist()]
+    stacked = jax.tree.map(lambda *parts: np.concatenate(parts, axis=-1), *others)
+    solver = condense(first, n_steps=4)
+    found = solver.solve(load_array(first, [[Load("tip", tuple(force))]] * len(towards)), geometry=stacked)
+    assert found.ok.all(), found.reasons
+    axes = [frame_arrays(leaf(direction)).axes[0] for direction in towards.tolist()]
+    turns = [own.T @ frame_arrays(first).axes[0] for own in axes]
+    seen = load_array(first, [[Load("tip", tuple((turn.T @ force).tolist()))] for turn in turns])
+    expected = solver.solve(seen).at("tip").reshape(-1, 2, 3)
+    assert_allclose(found.at("tip").reshape(-1, 2, 3), np.einsum("nij,nkj->nki", turns, expected), atol=1e-12)
