@@ -83,5 +83,6 @@ def geometry(some: Floats) -> Geometry:
     return Geometry(
         np.stack([a.coordinates.T for a in arrays], -1),
         np.stack([a.through.T for a in arrays], -1),
+        arrays[0].up.T[:, :, None],
         Properties(*(np.stack(p, -1) for p in zip(*(a.properties for a in arrays), strict=True))),
     )

@@ -18,6 +18,7 @@ Two solvers take it from there: :func:`factorise` for small displacements, :func
 :mod:`.elements`       the Timoshenko beam and the arc: pure functions of shape and properties
 :mod:`.assembly`       the stiffness of the frame and the kinematics of its rigid bodies
 :mod:`.linear`         factorise once, solve many load cases
+:mod:`.between`        the stiffness of members between rigid bodies, in many geometries
 :mod:`.varying`        one frame in many geometries
 **large**
 :mod:`.rods`           a member as an initial value problem

@@ -37,12 +37,15 @@ class Geometry(NamedTuple):
         m.
     through : Array, shape (3, n_members, ...)
         A point of each member between its ends, m; of a straight one the middle of the chord.
+    up : Array, shape (3, n_members, ...)
+        Direction whose part normal to the member is local z.
     properties : Properties
         Of shape (n_members, ...), SI.
     """
 
     coordinates: Array | NDArray[np.float64]
     through: Array | NDArray[np.float64]
+    up: Array | NDArray[np.float64]
     properties: Properties
 
 
@@ -51,6 +54,7 @@ def geometry(arrays: FrameArrays) -> Geometry:
     return Geometry(
         arrays.coordinates.T[:, :, None],
         arrays.through.T[:, :, None],
+        arrays.up.T[:, :, None],
         Properties(*(p[:, None] for p in arrays.properties)),
     )
 
@@ -87,7 +91,7 @@ def member_shapes(arrays: FrameArrays, geometry: Geometry) -> Shapes:
     """The shapes of the members in a geometry."""
     x, a, b = geometry.coordinates, arrays.ends[:, 0], arrays.ends[:, 1]
     through = jnp.where(arrays.is_curved[:, None], geometry.through, (x[:, a] + x[:, b]) / 2)
-    return shapes(jnp, x[:, a], x[:, b], through, arrays.up.T[:, :, None])
+    return shapes(jnp, x[:, a], x[:, b], through, geometry.up)
 
 
 def rods(arrays: FrameArrays, space: Space, unit: Units, geometry: Geometry, shape: Shapes) -> Rods:

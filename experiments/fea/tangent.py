@@ -128,7 +128,7 @@ def step(topology: Topology, tangent: Tangent, gap: Array, force: Array, ahead: 
     pulls = jnp.concatenate([pull, -multiply(transpose(back), pull), none], axis=2)
     right = force + topology.forces(pulls)[:, :, : topology.n_free]
     if topology.held.any():
-        blocks, right = _held(topology, blocks, right, ahead)
+        blocks, right = prescribe(topology, blocks, right, ahead)
     motion, negative = solve(topology.plan, blocks, right)
     motion = jnp.pad(motion, [(0, 0), (0, 0), (0, topology.n_blocks - topology.n_free), (0, 0)])
     relative = multiply(back, gap + motion[:, :, topology.end]) - motion[:, :, topology.start]
@@ -136,7 +136,7 @@ def step(topology: Topology, tangent: Tangent, gap: Array, force: Array, ahead: 
     return Step(motion, wrench, relative, negative)
 
 
-def _held(topology: Topology, blocks: Array, right: Array, ahead: Array) -> tuple[Array, Array]:
+def prescribe(topology: Topology, blocks: Array, right: Array, ahead: Array) -> tuple[Array, Array]:
     """Rows of prescribed motions become δ = ahead, and what they do to the others goes to the right-hand side."""
     known = topology.rows(multiply(blocks, ahead[:, :, topology.columns]))
     held = topology.held[:, None]

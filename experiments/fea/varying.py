@@ -1,7 +1,6 @@
 """Small displacements of one frame in many geometries: a tolerance study, a search for dimensions.
 
-One Newton step from rest of the condensed frame is its linear solution, so bodies are eliminated block
-by block: the cost grows with their number and not its cube, and all is compiled once.
+Bodies are eliminated block by block: the cost grows with their number and not its cube, and all is compiled once.
 """
 
 from collections.abc import Sequence
@@ -15,22 +14,20 @@ from jax import Array
 from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
-from . import scaling
 from .arrays import FrameArrays, frame_arrays
+from .between import joined, stiffness
 from .blocks import cross
-from .condensed import Problem, State, Topology, topology
+from .condensed import Topology, topology
+from .elimination import solve
 from .kernel import in_blocks, taken
 from .loads import checked
 from .mechanisms import check_held
 from .model import Frame
 from .nonlinear import CHUNK, chunks, in_threads
 from .precision import in_float64
-from .scaling import Geometry, Units
+from .scaling import Geometry
 from .spatial import Spatial
-from .tangent import step, tangent
-
-N_STEPS, N_STEPS_ARC = 4, 32
-"""Steps along members: the flexibility of a straight one is a cubic of the length, exact by any number."""
+from .tangent import prescribe
 
 
 def linear_displacements(
@@ -63,30 +60,28 @@ def linear_displacements(
     check_held(frame, arrays)
     where = tuple(frame.index(node) for node in nodes)
     loaded = tuple(np.flatnonzero(loads.any(axis=(0, 2))).tolist())
-    steps = N_STEPS_ARC if arrays.is_curved.any() else N_STEPS
-    solve = _compiled(frame, steps, loaded, where)
+    displaced = _compiled(frame, loaded, where)
     n = max(np.shape(leaf)[-1] for leaf in jax.tree.leaves(geometry))
 
     @in_float64
     def solved(rows: NDArray[np.int64]) -> NDArray[np.float64]:
         full = rows[np.minimum(np.arange(CHUNK), len(rows) - 1)]
-        found = np.asarray(solve(taken(geometry, full), loads[:, list(loaded)]))
-        return np.broadcast_to(found, (*found.shape[:-1], CHUNK))[..., : len(rows)].transpose(3, 1, 2, 0)
+        some = taken(geometry, full)
+        some = some._replace(coordinates=np.broadcast_to(some.coordinates, (*np.shape(some.coordinates)[:-1], CHUNK)))
+        return np.asarray(displaced(some, loads[:, list(loaded)]))[..., : len(rows)].transpose(3, 1, 2, 0)
 
     return np.concatenate(list(in_threads(solved, chunks(n))))
 
 
 @lru_cache(maxsize=8)
-def _compiled(frame: Frame, n_steps: int, loaded: tuple[int, ...], where: tuple[int, ...]) -> Any:
+def _compiled(frame: Frame, loaded: tuple[int, ...], where: tuple[int, ...]) -> Any:
     arrays, space = frame_arrays(frame), Spatial()
-    plan, units = topology(arrays, space, n_steps), scaling.units(arrays)
+    plan = topology(arrays, space, n_steps=0)
 
     def some(loads: Array, geometry: Geometry) -> Array:
-        forces = _on_blocks(arrays, units, geometry, loaded, loads)
-        motion = _motions(arrays, plan, units, geometry, forces)
-        scale = jnp.array([units.length] * 3 + [1.0] * 3).reshape(6, 1, 1, 1)
+        motion = _motions(arrays, plan, geometry, _on_blocks(arrays, geometry, loaded, loads))
         arm = _arms(arrays, geometry, where)
-        at = scale * motion[:, :, arrays.block[list(where)]]
+        at = motion[:, :, arrays.block[list(where)]]
         carried = cross(at[3:], jnp.broadcast_to(arm[:, None], at[3:].shape))
         return at.at[:3].add(carried)
 
@@ -96,29 +91,22 @@ def _compiled(frame: Frame, n_steps: int, loaded: tuple[int, ...], where: tuple[
     return jax.jit(blockwise)
 
 
-def _motions(arrays: FrameArrays, plan: Topology, units: Units, geometry: Geometry, forces: Array) -> Array:
-    """Of the blocks from rest, (6, n_loads, n_blocks, n_points)."""
-    space, n_points = plan.space, forces.shape[-1]
-    rods, rest, _ = scaling.condensed(arrays, space, units, plan.n_steps, geometry)
-    zero = jnp.zeros(n_points)
-    state = State(jnp.zeros((space.size, len(plan.start), n_points)), rest + zero)
-    dead = jnp.zeros((space.n_dead, plan.n_blocks, 1))
-    still = jnp.zeros((space.size, plan.n_free, n_points))
-    problem = Problem(rods, rest, dead, dead[: space.size], still)
-    _, twist, _ = space.law(state.wrench, rods, plan.n_steps)
-    slope = tangent(plan, problem, state, zero, twist)
-    n_loads = forces.shape[1]
-    gap = jnp.zeros((space.size, n_loads, len(plan.start), n_points))
-    ahead = jnp.zeros((space.size, n_loads, plan.n_free, n_points))
-    return step(plan, slope, gap, forces[:, :, : plan.n_free], ahead).motion
+def _motions(arrays: FrameArrays, plan: Topology, geometry: Geometry, forces: Array) -> Array:
+    """Of the blocks, (6, n_loads, n_blocks, n_points), SI."""
+    blocks = stiffness(arrays, joined(arrays, plan.plan), geometry)
+    right = forces[:, :, : plan.n_free]
+    if plan.held.any():
+        blocks, right = prescribe(plan, blocks, right, jnp.zeros_like(right))
+    motion, _ = solve(plan.plan, blocks, right)
+    return jnp.pad(motion, [(0, 0), (0, 0), (0, plan.n_blocks - plan.n_free), (0, 0)])
 
 
-def _on_blocks(arrays: FrameArrays, units: Units, geometry: Geometry, loaded: tuple[int, ...], loads: Array) -> Array:
-    """Loads on the blocks about their origins, (6, n_loads, n_blocks, n_points), in units of order one."""
+def _on_blocks(arrays: FrameArrays, geometry: Geometry, loaded: tuple[int, ...], loads: Array) -> Array:
+    """Loads on the blocks about their origins, (6, n_loads, n_blocks, n_points), SI."""
     n_points = max(jnp.shape(leaf)[-1] for leaf in jax.tree.leaves(geometry))
-    force = jnp.moveaxis(loads[..., :3], -1, 0)[..., None] / units.force + jnp.zeros(n_points)
-    moment = jnp.moveaxis(loads[..., 3:], -1, 0)[..., None] / (units.force * units.length)
-    arm = jnp.broadcast_to((_arms(arrays, geometry, loaded) / units.length)[:, None], force.shape)
+    force = jnp.moveaxis(loads[..., :3], -1, 0)[..., None] + jnp.zeros(n_points)
+    moment = jnp.moveaxis(loads[..., 3:], -1, 0)[..., None]
+    arm = jnp.broadcast_to(_arms(arrays, geometry, loaded)[:, None], force.shape)
     wrench = jnp.concatenate([force, moment + cross(arm, force)])
     total = jnp.zeros((6, len(loads), arrays.n_blocks, n_points))
     for i, node in enumerate(loaded):

@@ -92,7 +92,8 @@ def geometry(cases: Sequence[Case]) -> Geometry:
     ea, gy, gz, gj, ey, ez = np.transpose([case.stiffness for case in cases])[:, None]
     one = np.ones_like(ea)
     through = np.transpose([[case.curve(0.5)] for case in cases])
-    return Geometry(np.transpose(coordinates), through, Properties(one, one, ea, ey, ez, gj, gy, gz))
+    up = np.array([0.0, 0.0, 1.0])[:, None, None]
+    return Geometry(np.transpose(coordinates), through, up, Properties(one, one, ea, ey, ez, gj, gy, gz))
 
 
 @dataclass(frozen=True)
