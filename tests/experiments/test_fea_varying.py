@@ -30,12 +30,8 @@ def hexflex(rng):
 
 def arch(rng):
     """An arc and a shear-flexible strut, off every axis, on a lever that a support lets turn."""
-    a, b, c, d = rng.uniform(-0.01, 0.01, (4, 3)) + [
-        [0, 0, 0],
-        [0.1, 0.02, 0.03],
-        [0.12, 0.05, 0.0],
-        [0.2, -0.02, 0.04],
-    ]
+    about = np.array([[0, 0, 0], [0.1, 0.02, 0.03], [0.12, 0.05, 0.0], [0.2, -0.02, 0.04]])
+    a, b, c, d = about + rng.uniform(-0.01, 0.01, (4, 3))
     nodes = {name: tuple(place.tolist()) for name, place in zip("abcd", (a, b, c, d), strict=True)}
     round_one, flat = circle(rng.uniform(0.002, 0.004)), rectangle(0.01, rng.uniform(0.001, 0.002))
     material = Material(rng.uniform(60e9, 80e9), 0.33)
