@@ -29,6 +29,9 @@ from .scaling import Geometry
 from .spatial import Spatial
 from .tangent import prescribe
 
+BLOCK = 32
+"""Geometries that are worked on together; by measurement."""
+
 
 def linear_displacements(
     frame: Frame, loads: ArrayLike, geometry: Geometry, nodes: Sequence[str]
@@ -75,8 +78,8 @@ def linear_displacements(
 
 @lru_cache(maxsize=8)
 def _compiled(frame: Frame, loaded: tuple[int, ...], where: tuple[int, ...]) -> Any:
-    arrays, space = frame_arrays(frame), Spatial()
-    plan = topology(arrays, space, n_steps=0)
+    arrays = frame_arrays(frame)
+    plan = topology(arrays, Spatial(), n_steps=0)
 
     def some(loads: Array, geometry: Geometry) -> Array:
         motion = _motions(arrays, plan, geometry, _on_blocks(arrays, geometry, loaded, loads))
@@ -86,7 +89,7 @@ def _compiled(frame: Frame, loaded: tuple[int, ...], where: tuple[int, ...]) -> 
         return at.at[:3].add(carried)
 
     def blockwise(geometry: Geometry, loads: Array) -> Array:
-        return in_blocks(lambda g: some(loads, g), space.block, geometry)
+        return in_blocks(lambda g: some(loads, g), BLOCK, geometry)
 
     return jax.jit(blockwise)
 
