@@ -4,6 +4,7 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,9 +43,9 @@ def directions(
         n_cases = max(coordinates.shape[-1], len(loads))
         return dead_loads(arrays, space, unit, coordinates, np.broadcast_to(loads, (n_cases, *loads.shape[1:])))
 
-    pulled = np.stack([dead(place, one[None]) for one in toward.loads])
-    motion = np.moveaxis(prescribed(arrays, space, unit, toward.motions), -1, 0)[..., None]
-    still = np.zeros((len(pulled), space.size, arrays.n_blocks, 1))
+    pulled = jnp.asarray(np.stack([dead(place, one[None]) for one in toward.loads]))
+    motion = jnp.moveaxis(jnp.asarray(prescribed(arrays, space, unit, toward.motions)), -1, 0)[..., None]
+    still = jnp.zeros((len(pulled), space.size, arrays.n_blocks, 1))
     if toward.geometry is None:
         return Directions(pulled, still, motion)
     change = jax.tree.map(lambda g, d: spread(d, g, len(pulled)), geometry, toward.geometry)

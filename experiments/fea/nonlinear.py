@@ -278,18 +278,19 @@ class NonlinearSolver:
 
     def _toward(self, loads: ArrayLike | None, motions: ArrayLike | None, geometry: Geometry | None) -> Toward:
         """Directions as they are given, as many of each."""
-        parts = [part for part in (loads, motions, *jax.tree.leaves(geometry)) if np.ndim(part)]
+        given = [part for part in (loads, motions, *jax.tree.leaves(geometry)) if part is not None]
+        parts = [np.asarray(part) for part in given if np.ndim(part)]
         if not parts:
             raise ValueError(
                 "there is no direction: give load_directions, motion_directions or geometry_directions, "
                 "with the directions as first axis"
             )
-        none = np.zeros((len(np.asarray(parts[0])), len(self.frame.nodes), 6))
-        given = self._checked(none if loads is None else loads, none if motions is None else motions, None)
-        wrong = [len(np.asarray(part)) for part in parts if len(np.asarray(part)) != len(none)]
+        none = np.zeros((len(parts[0]), len(self.frame.nodes), 6))
+        wrong = [len(part) for part in parts if len(part) != len(none)]
         if wrong:
             raise ValueError(f"there are {len(none)} directions of one kind and {wrong[0]} of another: give as many")
-        return Toward(given[0], given[1], geometry)
+        pulls, turns, _ = self._checked(none if loads is None else loads, none if motions is None else motions, None)
+        return Toward(pulls, turns, geometry)
 
     @cached_property
     def _condensed(self) -> Any:

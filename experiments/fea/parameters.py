@@ -53,7 +53,8 @@ def geometry_rates(build: Callable[..., Frame], at: Sequence[float], steps: Sequ
 def _difference(values: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     """An infinite shear area stays what it is."""
     finite = np.isfinite(values[0])
-    return sum(w * np.where(finite, v, 0.0) for (_, w), v in zip(WEIGHTS, values, strict=True))
+    weights = np.array([weight for _, weight in WEIGHTS])
+    return np.tensordot(weights, np.where(finite, np.stack(values), 0.0), 1)
 
 
 def _geometry(base: Frame, frame: Frame) -> Geometry:
