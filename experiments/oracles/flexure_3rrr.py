@@ -1,6 +1,7 @@
 """The planar 3-RRR flexure mechanism of Durango et al.: crank angles and a wrench in, pose, torques and stress out."""
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -58,8 +59,9 @@ class Flexure3RRR(Oracle):
     thickness: float = parameter(0.0001, "m", "thickness of the flexures")
     young: float = parameter(70e9, "Pa", "Young's modulus, aluminium 7075")
     poisson: float = parameter(0.33, "1", "Poisson's ratio; it acts on shear only")
+    shear: bool = parameter(False, "", "whether the flexures shear; the thesis's elastica does not")
     method: str = parameter("beams", "", "beams (geometrically exact) or assur (the thesis's Assur-group method)")
-    n_steps: int = parameter(4, "1", "integration steps along each flexure, even; for beams")
+    n_steps: int = parameter(6, "1", "integration steps along each flexure, even; for beams")
     stress_limit: float | None = parameter(None, "Pa", "reject points with a larger bending stress")
 
     def __post_init__(self) -> None:
@@ -114,6 +116,8 @@ class Flexure3RRR(Oracle):
     def frame(self) -> Frame:
         """The mechanism as a planar frame, dimensions in m."""
         section, material = rectangle(self.thickness, self.width), Material(self.young, self.poisson)
+        if not self.shear:
+            section = replace(section, shear_area_y=math.inf, shear_area_z=math.inf)
         nodes: dict[str, tuple[float, float, float]] = {CENTRE: (0.0, 0.0, 0.0)}
         members, bodies, clamps, supports = [], [], [], []
         for leg, places in zip(LEGS, self._legs(), strict=True):
