@@ -73,6 +73,13 @@ class ScreeningTable(Table):
     design: ScreeningDesign = ScreeningDesign()
     alpha: float = Field(default=0.05, gt=0.0, lt=1.0, description="error rate of Lenth's margins")
     keep: list[str] = Field(default=[], description="factors kept whatever the screening says")
+    tolerance: float = Field(
+        default=0.05,
+        ge=0.0,
+        lt=1.0,
+        description="share of a response's standard deviation that main effects may leave unexplained before factors "
+        "without one are kept too",
+    )
 
 
 class FitTable(Table):

@@ -85,11 +85,7 @@ def summary(outcome: Outcome) -> None:
             loop,
         )
     console.print(table)
-    if outcome.screening.flagged_dummies:
-        console.print("Dummy columns carry more than noise: interactions of factors act as well.", style="yellow")
-    if outcome.screening.undecided:
-        names = ", ".join(outcome.screening.undecided)
-        console.print(f"Screening could not decide who acts on {names}: all factors are kept.", style="yellow")
+    _adequacy(outcome)
     _inverse(outcome)
     seconds = np.sum(list(outcome.seconds.values()))
     console.print(f"Took {seconds:.1f} s.")
@@ -98,6 +94,16 @@ def summary(outcome: Outcome) -> None:
         places["Code"] = "exports"
     for what, name in places.items():
         console.print(f"{what + ':':<8}[bold]{escape(str(outcome.path / name))}[/bold]", soft_wrap=True)
+
+
+def _adequacy(outcome: Outcome) -> None:
+    """Whether main effects tell who acts, and what the screening asks for if not."""
+    found = outcome.screening.adequacy(outcome.study.config.screening.tolerance)
+    if found.adequate:
+        return
+    named = ", ".join(r.response for r in found.responses if r.reasons)
+    console.print(f"Main effects do not tell the whole story of {named}: {escape(found.advice)}.", style="yellow")
+    console.print(f"Kept for the fit: {', '.join(outcome.kept)}.", style="yellow")
 
 
 def _inverse(outcome: Outcome) -> None:

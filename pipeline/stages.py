@@ -29,11 +29,12 @@ def screened(study: Study, runs: Runs) -> Screening:
 def kept_factors(study: Study, screening: Screening) -> tuple[str, ...]:
     """Factors worth filling: those that act on some response, and those the config keeps.
 
-    All of them, if some response moves but no single factor stands out: dropping one would be a guess.
+    Where main effects are not the whole story, also those that may act behind them; all, if none can be
+    ruled out: dropping one would be a guess.
     """
-    if screening.undecided:
-        return study.space.names
-    wanted = {*screening.active_factors, *study.config.screening.keep}
+    adequacy = screening.adequacy(study.config.screening.tolerance)
+    acting = screening.active_factors if adequacy.adequate else adequacy.keep
+    wanted = {*acting, *study.config.screening.keep}
     if not wanted:
         raise InputError(
             "no response moves when the factors do: widen the ranges, look at the oracle, or name the factors "

@@ -68,3 +68,12 @@ def test_nonlinear_beams_page_runs():
     assert names["found"].ok.all()
     deflection = names["found"].at("tip")[:, 2]
     assert 4 * deflection[0] < deflection[1] < deflection[0] < 0  # four times the load, less than four times the way
+
+
+def test_every_claim_of_the_page_on_designs_holds():
+    names = {}
+    code = blocks("docs/choosing-a-design.md", "python")
+    assert len(code) > 10
+    for block in code:
+        assert "assert" in block
+        exec(compile(block, "docs/choosing-a-design.md", "exec"), names)

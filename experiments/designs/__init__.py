@@ -14,24 +14,62 @@ from typing import Any
 from ..naming import suggestion
 from ..settings import build
 from .base import Design, DesignMethod
-from .discrepancy import centred_discrepancy_squared, level_discrepancy_squared
+from .d_optimal import DOptimal
+from .definitive_screening import DefinitiveScreening
+from .discrepancy import (
+    centred_discrepancy_squared,
+    level_discrepancy_squared,
+    mixture_discrepancy_squared,
+    wraparound_discrepancy_squared,
+)
+from .fractional_factorial import FractionalFactorial
+from .fractions import Fraction
+from .full_factorial import FullFactorial
+from .hadamard import hadamard
 from .plackett_burman import PlackettBurman
-from .space_filling import LatinHypercube, Random
+from .properties import Properties, properties
+from .space_filling import Halton, LatinHypercube, Random, Sobol
 from .uniform import Uniform
 
-METHODS: dict[str, type[DesignMethod]] = {cls.method: cls for cls in (PlackettBurman, Uniform, LatinHypercube, Random)}
+METHODS: dict[str, type[DesignMethod]] = {
+    cls.method: cls
+    for cls in (
+        PlackettBurman,
+        FractionalFactorial,
+        FullFactorial,
+        DefinitiveScreening,
+        DOptimal,
+        Uniform,
+        LatinHypercube,
+        Sobol,
+        Halton,
+        Random,
+    )
+}
 
 __all__ = [
     "METHODS",
+    "DOptimal",
+    "DefinitiveScreening",
     "Design",
     "DesignMethod",
+    "Fraction",
+    "FractionalFactorial",
+    "FullFactorial",
+    "Halton",
     "LatinHypercube",
     "PlackettBurman",
+    "Properties",
     "Random",
+    "Sobol",
     "Uniform",
     "centred_discrepancy_squared",
     "get",
+    "hadamard",
     "level_discrepancy_squared",
+    "mixture_discrepancy_squared",
+    "properties",
+    "wraparound_discrepancy_squared",
 ]
 
 

@@ -24,8 +24,9 @@ class Design:
     method : str
         Name of the method that made it.
     dummies : array_like, shape (n_runs, n_dummies), optional
-        Columns of an orthogonal two-level design that no factor was assigned to. Their contrasts
-        carry what the main effects cannot explain: noise and interactions.
+        Columns of an orthogonal design that no factor was assigned to. Their contrasts carry what
+        the main effects cannot explain: noise and interactions. Runs that a column does not weigh,
+        such as centre runs, are 0 there.
 
     Raises
     ------

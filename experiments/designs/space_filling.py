@@ -1,4 +1,4 @@
-"""Random and Latin hypercube designs, by scipy."""
+"""Random, Latin hypercube, Sobol' and Halton designs, by scipy."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -67,3 +67,71 @@ class Random:
         """The design on `space`."""
         coded = np.random.default_rng(rng).uniform(-1.0, 1.0, (self.n_runs, len(space)))
         return Design(space, coded, self.method)
+
+
+@dataclass(frozen=True)
+class Sobol:
+    """Scrambled Sobol' points: a sequence whose every power-of-two beginning is balanced.
+
+    Parameters
+    ----------
+    n_runs : int
+        At least 1. Powers of two are balanced: each half, quarter, … of every factor then holds the
+        same number of runs; other sizes are cut from the sequence and lose that.
+
+    Notes
+    -----
+    Sobol' (1967), USSR Comput. Math. Math. Phys. 7(4), 86–112, with the direction numbers of Joe and Kuo
+    (2008), SIAM J. Sci. Comput. 30, 2635–2654, and Owen's scrambling by linear matrices; by
+    :class:`scipy.stats.qmc.Sobol`. At most 21201 factors.
+    """
+
+    method: ClassVar[str] = "sobol"
+    title: ClassVar[str] = "Sobol' points"
+    summary: ClassVar[str] = "scrambled low-discrepancy sequence, balanced at powers of two"
+
+    n_runs: int = parameter(64, "runs", "any number; powers of two are balanced")
+
+    def __post_init__(self) -> None:
+        check_count("n_runs of Sobol' points", self.n_runs, 1)
+
+    def generate(self, space: FactorSpace, rng: Seed = 0) -> Design:
+        """The design on `space`; `rng` seeds the scrambling."""
+        from scipy.stats import qmc  # slow to import, and not needed by a surrogate that only predicts
+
+        sampler = qmc.Sobol(len(space), rng=np.random.default_rng(rng))
+        points = sampler.random_base2((self.n_runs - 1).bit_length())[: self.n_runs]
+        return Design(space, 2.0 * points - 1.0, self.method)
+
+
+@dataclass(frozen=True)
+class Halton:
+    """Scrambled Halton points: a low-discrepancy sequence of any length, one prime base a factor.
+
+    Parameters
+    ----------
+    n_runs : int
+        At least 1.
+
+    Notes
+    -----
+    Halton (1960), Numer. Math. 2, 84–90; scrambled digit by digit as in Owen (2017), "A randomized Halton
+    algorithm in R", arXiv:1706.02808; by :class:`scipy.stats.qmc.Halton`. Beyond some ten factors its
+    pairs of late factors fill poorly, because their bases are large.
+    """
+
+    method: ClassVar[str] = "halton"
+    title: ClassVar[str] = "Halton points"
+    summary: ClassVar[str] = "scrambled low-discrepancy sequence of any length"
+
+    n_runs: int = parameter(60, "runs", "any number")
+
+    def __post_init__(self) -> None:
+        check_count("n_runs of Halton points", self.n_runs, 1)
+
+    def generate(self, space: FactorSpace, rng: Seed = 0) -> Design:
+        """The design on `space`; `rng` seeds the scrambling."""
+        from scipy.stats import qmc  # slow to import, and not needed by a surrogate that only predicts
+
+        sampler = qmc.Halton(len(space), rng=np.random.default_rng(rng))
+        return Design(space, 2.0 * sampler.random(self.n_runs) - 1.0, self.method)

@@ -8,22 +8,23 @@ from numpy.typing import NDArray
 
 from ..factors import FactorSpace
 from ..settings import parameter
+from .annealing import HEATS, anneal, legs
 from .base import Design, Seed, check_count
-from .discrepancy import centred_kernels, unit_levels
-
-HOTTEST, COLDEST = 1e-1, 1e-3
-"""First and last temperature, as fractions of the typical change of CD₂² at the start."""
+from .discrepancy import criterion_named
 
 MOST_RUNS = 2000
-"""Memory and work of one exchange grow with the square of the runs."""
+"""Memory and work of one round grow with the square of the runs."""
+
+WARM = 0.2
+"""Heat of the first annealing from a given design: enough to leave a shallow dip, too little to forget the start."""
 
 
 @dataclass(frozen=True)
 class Uniform:
-    """U-type design of low centred discrepancy.
+    """U-type design of low discrepancy.
 
-    Every level appears equally often in every column; CD₂² is minimised by exchanging two entries
-    of one column at a time.
+    Every level appears equally often in every column; the squared discrepancy is minimised by
+    exchanging two entries of one column at a time.
 
     Parameters
     ----------
@@ -31,36 +32,39 @@ class Uniform:
         Runs, a multiple of `levels`.
     levels : int
         Levels per factor, at least 2; level k of q sits at coded −1 + 2(k − 1)/(q − 1), so the
-        outer levels lie on the faces of the box.
+        outer levels lie on the faces of the box. The discrepancy counts it as (2k − 1)/(2q).
     budget : int
-        Exchanges made. Work is counted, not seconds, so the same seed gives the same design.
+        Exchanges tried. Work is counted, not seconds, so the same seed gives the same design. A
+        core tries some 5 to 10 million a second.
+    criterion : str
+        ``"centred"``, ``"mixture"`` or ``"wraparound"``: the squared L2-discrepancy to lower.
 
     Raises
     ------
     ValueError
-        If a count is too small or `n_runs` is not a multiple of `levels`.
+        If a count is too small, `n_runs` is not a multiple of `levels`, or `criterion` is unknown.
 
     Notes
     -----
     Fang, Lin, Winker and Zhang (2000), "Uniform design: theory and application", Technometrics 42,
-    237–248. With all other columns fixed, CD₂² is a quadratic assignment of levels to runs, so one
-    matrix product prices every exchange in a column at once. The exchange is then drawn from the
-    Boltzmann distribution over all of them (heat-bath annealing) instead of being proposed and
-    mostly rejected.
+    237–248, for the designs; :mod:`experiments.designs.annealing` for the search. A large budget
+    buys several annealings, each from a new start; the best design met counts.
     """
 
     method: ClassVar[str] = "uniform"
     title: ClassVar[str] = "uniform design"
-    summary: ClassVar[str] = "balanced space-filling U-type design, centred discrepancy minimised"
+    summary: ClassVar[str] = "balanced space-filling U-type design, discrepancy minimised"
 
     n_runs: int = parameter(30, "runs", "a multiple of levels")
     levels: int = parameter(6, "levels", "levels per factor")
-    budget: int = parameter(20_000, "exchanges", "work spent on lowering the discrepancy")
+    budget: int = parameter(12_000_000, "exchanges", "exchanges tried to lower the discrepancy")
+    criterion: str = parameter("centred", "name", "discrepancy: centred, mixture or wraparound")
 
     def __post_init__(self) -> None:
         check_count("levels of a uniform design", self.levels, 2, MOST_RUNS)
         check_count("n_runs of a uniform design", self.n_runs, 2, MOST_RUNS)
-        check_count("budget of a uniform design", self.budget, 0)
+        check_count("budget of a uniform design", self.budget, 0, 10**12)
+        criterion_named(self.criterion)
         if self.n_runs % self.levels:
             lower = self.n_runs // self.levels * self.levels
             near = [n for n in (lower, lower + self.levels) if n >= max(2, self.levels)]
@@ -70,78 +74,96 @@ class Uniform:
             )
 
     def generate(self, space: FactorSpace, rng: Seed = 0) -> Design:
-        """The design on `space`; `rng` seeds the start and the annealing."""
+        """The design on `space`; `rng` seeds the starts and the annealing."""
+        return self._search(space, np.empty((0, len(space)), dtype=np.int64), self.n_runs, rng)
+
+    def improve(self, design: Design, rng: Seed = 0) -> Design:
+        """A design of the same runs and level counts, annealed from `design`: never worse than it.
+
+        Parameters
+        ----------
+        design : Design
+            Any number of runs; every setting on one of the `levels` levels, balanced or not.
+        rng : int, SeedSequence or Generator
+
+        Raises
+        ------
+        ValueError
+            If a setting lies between the levels, or there are too many runs.
+        """
+        check_count("runs of a design to improve", len(design), 1, MOST_RUNS)
+        start = self._centred(self._ranks(design))
         generator = np.random.default_rng(rng)
-        balanced = np.tile(np.arange(self.levels), self.n_runs // self.levels)
-        start = np.column_stack([generator.permutation(balanced) for _ in space])
-        chosen = anneal(start, self.levels, self.budget, generator)
-        return Design(space, -1.0 + 2.0 * chosen / (self.levels - 1), self.method)
+        best = anneal(start, criterion_named(self.criterion), self.budget, generator, heat=WARM)
+        return self._design(design.space, best)
+
+    def augment(self, design: Design, extra: int, rng: Seed = 0) -> Design:
+        """The runs of `design`, in their order, followed by `extra` new ones placed where they fill best.
+
+        The levels are used as equally often as the given runs allow: the new ones go where a column
+        has fewest. `n_runs` has no say here.
+
+        Parameters
+        ----------
+        design : Design
+            Runs already paid for; every setting on one of the `levels` levels, balanced or not.
+        extra : int
+            New runs, at least 1.
+        rng : int, SeedSequence or Generator
+
+        Raises
+        ------
+        ValueError
+            If a setting lies between the levels, `extra` is below 1, or there would be too many runs.
+        """
+        check_count("runs to add to a uniform design", extra, 1, MOST_RUNS)
+        check_count("runs of a uniform design and those added", len(design) + extra, 2, MOST_RUNS)
+        return self._search(design.space, self._ranks(design), extra, rng)
+
+    def _search(self, space: FactorSpace, given: NDArray[np.int64], extra: int, rng: Seed) -> Design:
+        """`given` with `extra` rows added, the best of several annealings of the added rows."""
+        generator, criterion = np.random.default_rng(rng), criterion_named(self.criterion)
+        best, lowest, winner = np.empty((0, len(space))), np.inf, HEATS[0]
+        for leg, budget in enumerate(legs(self.budget, extra)):
+            heat = HEATS[leg] if leg < len(HEATS) else winner
+            fill = np.column_stack([fewest_first(column, self.levels, extra, generator) for column in given.T])
+            start = self._centred(np.vstack([given, fill]))
+            found = anneal(start, criterion, budget, generator, movable=extra, heat=heat)
+            value = criterion.value(found + 0.5)
+            if value < lowest:
+                best, lowest, winner = found, value, heat
+        return self._design(space, best)
+
+    def _ranks(self, design: Design) -> NDArray[np.int64]:
+        """Levels 0 … levels − 1 of a given design."""
+        position = (design.coded + 1.0) * (self.levels - 1) / 2.0
+        ranks = np.rint(position).astype(np.int64)
+        off = (np.abs(position - ranks) > 1e-6) | (ranks < 0) | (ranks >= self.levels)
+        if off.any():
+            row, column = np.argwhere(off)[0]
+            raise ValueError(
+                f"setting {design.coded[row, column]:.6g} of factor {design.space.names[column]!r} in run {row + 1} is "
+                f"not one of {self.levels} equally spaced levels from -1 to 1; give the levels it was made with"
+            )
+        return ranks
+
+    def _centred(self, ranks: NDArray[np.int64]) -> NDArray[np.float64]:
+        return (ranks + 0.5) / self.levels - 0.5
+
+    def _design(self, space: FactorSpace, centred: NDArray[np.float64]) -> Design:
+        ranks = np.rint((centred + 0.5) * self.levels - 0.5)
+        return Design(space, -1.0 + 2.0 * ranks / (self.levels - 1), self.method)
 
 
-def anneal(design: NDArray[np.int64], levels: int, budget: int, rng: np.random.Generator) -> NDArray[np.int64]:
-    """The design of lowest CD₂² met in `budget` exchanges, shape (n_runs, n_factors), levels 0 … levels − 1."""
-    state = _State(design.copy(), levels)
-    best, best_value = state.design.copy(), state.value()
-    changes = np.concatenate([state.price(c)[0] for c in range(design.shape[1])])
-    typical = np.abs(changes[np.isfinite(changes)]).mean() + np.finfo(float).tiny
-    value = best_value
-    for step, temperature in enumerate(typical * np.geomspace(HOTTEST, COLDEST, budget)):
-        column = step % design.shape[1]
-        change, first, second = state.price(column)
-        noise = rng.gumbel(size=change.shape)
-        pick = int(np.argmax(noise - change / temperature))
-        value += change[pick]
-        state.exchange(column, first[pick], second[pick])
-        if value < best_value - 1e-13:
-            best, best_value = state.design.copy(), value
-    return best
+def fewest_first(column: NDArray[np.int64], levels: int, extra: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """`extra` levels in random order that make the counts of `column` and them together as equal as can be.
 
-
-class _State:
-    """A design with the products that make every exchange in a column cheap to price."""
-
-    def __init__(self, design: NDArray[np.int64], levels: int) -> None:
-        self.design = design
-        self.n = len(design)
-        self.single, self.pair = centred_kernels(unit_levels(levels))
-        self.first, self.second = np.triu_indices(self.n, 1)
-        self.once = np.prod(self.single[design], axis=1)
-        self.twice = np.ones((self.n, self.n))
-        for column in design.T:
-            self.twice *= self.pair[np.ix_(column, column)]
-
-    def value(self) -> float:
-        constant = (13.0 / 12.0) ** self.design.shape[1]
-        return float(constant - 2.0 / self.n * self.once.sum() + self.twice.sum() / self.n**2)
-
-    def price(self, column: int) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-        """Change of CD₂² for each exchange of two rows in `column`; +inf where both have the same level."""
-        level = self.design[:, column]
-        own = self.pair[np.ix_(level, level)]
-        rest = self.twice / own
-        # landed[i, j]: two-point sum of row i if it took the level of row j, all others unmoved.
-        landed = rest @ own
-        gain = landed - np.diag(landed)[:, None]
-        here = np.diag(own)
-        # Row i meets its own copy at the old level, and the partner that moves too: put both right.
-        kept = np.diag(rest)[:, None] * (here[None, :] + here[:, None] - 2.0 * own)
-        met = rest * (2.0 * own - here[None, :] - here[:, None])
-        change = (2.0 * (gain + gain.T) + kept + kept.T + 2.0 * met) / self.n**2
-        once = (self.once / self.single[level])[:, None] * (self.single[level][None, :] - self.single[level][:, None])
-        change -= 2.0 / self.n * (once + once.T)
-        flat = change[self.first, self.second]
-        flat[level[self.first] == level[self.second]] = np.inf
-        return flat, self.first, self.second
-
-    def exchange(self, column: int, i: int, j: int) -> None:
-        level = self.design[:, column]
-        rows = np.array([i, j])
-        self.once[rows] /= self.single[level[rows]]
-        self.twice[rows] /= self.pair[np.ix_(level[rows], level)]
-        self.twice[:, rows] = self.twice[rows].T
-        block = self.twice[np.ix_(rows, rows)]
-        level[rows] = level[rows[::-1]]
-        self.once[rows] *= self.single[level[rows]]
-        self.twice[rows] *= self.pair[np.ix_(level[rows], level)]
-        self.twice[:, rows] = self.twice[rows].T
-        self.twice[np.ix_(rows, rows)] = block * self.pair[np.ix_(level[rows], level[rows])]
+    Ties are broken at random, so that a remainder does not favour the same levels in every column.
+    """
+    counts = np.bincount(column, minlength=levels)
+    added = []
+    for _ in range(extra):
+        fewest = np.flatnonzero(counts == counts.min())
+        added.append(rng.choice(fewest))
+        counts[added[-1]] += 1
+    return rng.permutation(np.array(added, dtype=np.int64))

@@ -3,14 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..runs import Runs
+from .adequacy import Adequacy, judge_adequacy
 from .contrasts import Effects, effects
+from .evidence import MARGIN_OF_FLOOR
 from .lenth import LenthResult, lenth
-
-MARGIN_OF_FLOOR = 10.0
-"""How many noise floors a contrast must exceed to be called a movement."""
+from .noise import effect_error
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,28 +74,49 @@ class Screening:
                 found[response.name] = tuple(self.effects.names[i] for i in np.flatnonzero(flagged))
         return found
 
+    def adequacy(self, tolerance: float = 0.01, most_factors: int = 8) -> Adequacy:
+        """Whether main effects suffice, and the next design if not; see :func:`~.adequacy.judge_adequacy`."""
+        return judge_adequacy(self.effects, self.lenth, tolerance, most_factors)
 
-def screen(runs: Runs, alpha: float = 0.05, resolution: float = 0.0) -> Screening:
+
+def screen(
+    runs: Runs,
+    alpha: float = 0.05,
+    resolution: float = 0.0,
+    noise: ArrayLike | None = None,
+    critical: str = "t",
+) -> Screening:
     """Effects and Lenth's verdict for every response.
 
     Parameters
     ----------
     runs : Runs
-        A complete orthogonal two-level design.
+        A complete orthogonal two-level design, with or without centre points.
     alpha : float
         Error rate of the margins.
     resolution : float
         Relative resolution of the oracle: differences below this fraction of a response's largest
         value are rounding, not physics. Sets each response's noise floor.
+    noise : array_like, shape (n_responses,), optional
+        Standard deviation of one run, SI, declared or from :mod:`.noise`. Raises the floor to the standard error of
+        an effect, 2σ/√n.
+    critical : str
+        ``"t"`` or ``"simulated"``, as for :func:`~.lenth.lenth`.
 
     Raises
     ------
     ValueError
-        See :func:`effects` and :func:`lenth`.
+        See :func:`effects` and :func:`lenth`; or if `noise` is not one number of 0 or more for each response.
     """
     found = effects(runs)
+    floor = resolution * found.magnitude
+    if noise is not None:
+        declared = np.asarray(noise, dtype=float)
+        if declared.shape != floor.shape or not (np.isfinite(declared).all() and (declared >= 0.0).all()):
+            raise ValueError(f"noise needs a number of 0 or more for each of {len(floor)} responses, got {noise!r}")
+        floor = np.maximum(floor, effect_error(declared, found.n_runs))
     results = tuple(
-        lenth(found.values[:, j], found.names, alpha, resolution * float(found.magnitude[j]))
+        lenth(found.values[:, j], found.names, alpha, float(floor[j]), critical=critical, dummies=found.is_dummy)
         for j in range(len(found.responses))
     )
     return Screening(found, results)

@@ -35,6 +35,8 @@ CASES = {
             ({"n_runs": 2}, "at least 4, got 2"),
             ({"n_runs": 12.5}, "n_runs must be a whole number, got 12.5"),
             ({"n_runs": True}, "n_runs must be a whole number, got True"),
+            ({"n_centre": -1}, "n_centre of a Plackett-Burman design must be a whole number of at least 0, got -1"),
+            ({"foldover": "yes"}, "foldover must be true or false, got 'yes'"),
         ),
     ),
     "uniform": DesignCase(
@@ -56,6 +58,72 @@ CASES = {
         (
             ({"n_runs": 0}, "at least 1, got 0"),
             ({"n_runs": None}, "n_runs must be a whole number, got None"),
+        ),
+    ),
+    "full_factorial": DesignCase(
+        {"n_runs": 64},
+        64,
+        False,
+        (
+            ({"n_runs": 0}, "n_runs of a full factorial must be a whole number of at least 1, got 0"),
+            ({"levels": "2, x"}, "levels of a full factorial must be whole numbers of at least 1, got '2, x'"),
+            ({"levels": 0}, "must be whole numbers of at least 1, got 0"),
+            ({"levels": 3, "n_runs": 9}, "from levels or from n_runs, got both"),
+            ({"levels": True}, "levels must be a whole number or a text, got True"),
+        ),
+    ),
+    "fractional_factorial": DesignCase(
+        {"n_runs": 16},
+        16,
+        False,
+        (
+            ({"n_runs": 12}, "a power of two of runs, got 12; use n_runs = 8 or 16"),
+            ({"n_runs": 1}, "n_runs of a fractional factorial must be a whole number of at least 2, got 1"),
+            ({"resolution": 2}, "resolution of a fractional factorial must be a whole number of at least 3, got 2"),
+            ({"n_centre": -1}, "n_centre of a fractional factorial must be a whole number of at least 0, got -1"),
+            ({"foldover": 1}, "foldover must be true or false, got 1"),
+        ),
+    ),
+    "definitive_screening": DesignCase(
+        {"n_runs": 13},
+        13,
+        False,
+        (
+            ({"n_runs": 14}, "no definitive screening design with 14 runs .* nearest sizes: 9, 13, 17"),
+            ({"n_runs": 45}, "no definitive screening design with 45 runs .* nearest sizes: 37, 41, 49"),
+            ({"n_runs": 5}, "n_runs of a definitive screening design must be a whole number of at least 9, got 5"),
+            ({"fake_factors": -1}, "fake_factors of a definitive screening design must be .* at least 0, got -1"),
+            ({"extra_centre": -1}, "extra_centre of a definitive screening design must be .* at least 0, got -1"),
+        ),
+    ),
+    "d_optimal": DesignCase(
+        {"n_runs": 12, "model": "linear", "starts": 2},
+        12,
+        True,
+        (
+            ({"n_runs": 0}, "n_runs of a D-optimal design must be a whole number of at least 1, got 0"),
+            ({"levels": 1}, "levels of a D-optimal design must be a whole number of at least 2, got 1"),
+            ({"starts": 0}, "starts of a D-optimal design must be a whole number of at least 1, got 0"),
+            ({"model": " "}, "model of a D-optimal design must be 'linear', .* got ' '"),
+            ({"replicates": 0}, "replicates must be true or false, got 0"),
+        ),
+    ),
+    "sobol": DesignCase(
+        {"n_runs": 9},
+        9,
+        True,
+        (
+            ({"n_runs": 0}, "n_runs of Sobol' points must be a whole number of at least 1, got 0"),
+            ({"n_runs": None}, "n_runs must be a whole number, got None"),
+        ),
+    ),
+    "halton": DesignCase(
+        {"n_runs": 9},
+        9,
+        True,
+        (
+            ({"n_runs": 0}, "n_runs of Halton points must be a whole number of at least 1, got 0"),
+            ({"n_runs": "9"}, "n_runs must be a whole number, got '9'"),
         ),
     ),
     "random": DesignCase(

@@ -42,6 +42,11 @@ def lenth_case(name: str) -> dict[str, Any]:
     return json.loads((FOLDER / "lenth" / f"{name}.json").read_text(encoding="utf-8"))
 
 
+def recorded(name: str) -> dict[str, Any]:
+    """One JSON file of this folder, by its path without the ending."""
+    return json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
+
+
 def lenth_columns(case: dict[str, Any]) -> tuple[list[str], NDArray[np.float64]]:
     """Factor names (their first word) and ±1 columns; a text stands for the full factorial, first factor fastest."""
     names = [column.split()[0] for column in case["design_columns"]]
