@@ -43,12 +43,15 @@ def plan(arguments: Namespace) -> None:
     study = resolve(load_config(arguments.config, arguments.overrides))
     screening, n = study.screening_design, len(study.space)
     design_table(screening, f"Screening: {len(screening)} runs, {screening.method}")
+    folded = len(study.folded_screening or screening) - len(screening)
+    if folded:
+        console.print(f"Foldover, if the screening asks for it: {folded} runs more.")
     fill = stages.fill_design(study, study.space.names)
     terms = study.candidates(n)
     design_table(fill, f"Fit, if all {n} factors act: {len(fill)} runs, {fill.method}, {len(terms)} candidate terms")
     n_validation = study.config.validation.n_runs
     console.print(f"Validation: {n_validation} random runs; inversion: up to {n_validation} more.")
-    console.print(f"At most {len(screening) + len(fill) + 2 * n_validation} runs in all. Nothing was run.")
+    console.print(f"At most {len(screening) + folded + len(fill) + 2 * n_validation} runs in all. Nothing was run.")
 
 
 def report(arguments: Namespace) -> None:

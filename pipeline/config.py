@@ -73,6 +73,9 @@ class ScreeningTable(Table):
     design: ScreeningDesign = ScreeningDesign()
     alpha: float = Field(default=0.05, gt=0.0, lt=1.0, description="error rate of Lenth's margins")
     keep: list[str] = Field(default=[], description="factors kept whatever the screening says")
+    follow: bool = Field(
+        default=False, description="run the foldover too, where the screening asks for it: twice the screening runs"
+    )
     tolerance: float = Field(
         default=0.05,
         ge=0.0,

@@ -112,6 +112,9 @@ class _Runner:
         with self._timed("screening"):
             screening_runs = self._executed("screening", study.screening_design)
             screening = stages.screened(study, screening_runs)
+            if folded := stages.following(study, screening):
+                screening_runs = self._executed("screening", folded)
+                screening = stages.screened(study, screening_runs)
             folder.write("screening/effects.csv", tables.effects_csv(screening))
             kept = stages.kept_factors(study, screening)
         with self._timed("fill design"):

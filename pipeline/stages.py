@@ -7,7 +7,7 @@ from typing import Any
 import surrogates
 from experiments.designs import Design, Random
 from experiments.runs import Runs
-from experiments.screening import Screening, screen
+from experiments.screening import NextDesign, Screening, screen
 from surrogates import Inversion, RoundTrip, Surrogate, Verdict, certify, errors, obstacle, round_trip
 
 from .config import dump_config
@@ -24,6 +24,12 @@ def screened(study: Study, runs: Runs) -> Screening:
     if not runs.ok.all():
         raise TooManyFailures(f"screening needs every run: {runs.failures()}; mend the oracle or the ranges, run again")
     return screen(runs, study.config.screening.alpha, study.oracle.resolution)
+
+
+def following(study: Study, screening: Screening) -> Design | None:
+    """The foldover, first half included, if the screening asks for it and the config lets it be run."""
+    adequacy = screening.adequacy(study.config.screening.tolerance)
+    return study.folded_screening if adequacy.next_design is NextDesign.FOLDOVER else None
 
 
 def kept_factors(study: Study, screening: Screening) -> tuple[str, ...]:

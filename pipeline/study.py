@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -49,6 +50,15 @@ class Study:
         wanted = fit.runs_per_term * len(self.candidates(n_factors))
         return designs.get(fit.design.method, fit.design.settings, at_least=wanted)
 
+    @cached_property
+    def folded_screening(self) -> Design | None:
+        """The screening design with its foldover; None if the config does not allow it, or the design has none."""
+        chosen = self.config.screening.design
+        if not self.config.screening.follow or chosen.settings.get("foldover"):
+            return None
+        method = designs.get(chosen.method, {**chosen.settings, "foldover": True})
+        return method.generate(self.space, self.seed("screening"))
+
     def candidates(self, n_factors: int) -> Terms:
         """Candidate terms for that many factors."""
         names = [f"x{i}" for i in range(n_factors)]
@@ -85,6 +95,7 @@ def resolve(config: Config) -> Study:
     for name in screening.keep:
         _checked("screening.keep", lambda name=name: space.index(name))
     study = Study(config, oracle, space, design, config.export.prefix or config.name)
+    _checked("screening.follow", lambda: study.folded_screening)
     _check_fill(study)
     _check_exports(study)
     return study

@@ -283,6 +283,30 @@ class TestScreening:
         assert np.ptp(outcome.fit_runs.design.physical[:, D]) == pytest.approx(10.0)
         assert json.loads((outcome.path / "model.json").read_text())["provenance"]["kept_factors"] == list("abcd")
 
+    HIDING = ("screening.design.n_runs=12", "screening.design.n_centre=1", "screening.tolerance=0.01")
+
+    def test_what_may_act_behind_main_effects_is_kept(self, study):
+        """a:b leaves 3 % of u to the dummy columns: no factor can be ruled out then, d included."""
+        outcome = study(overrides=self.HIDING)
+        assert outcome.screening.active_factors == ("a", "b", "c")
+        assert outcome.kept == ("a", "b", "c", "d")
+        assert len(outcome.screening_runs) == 13
+
+    def test_the_foldover_is_run_where_it_is_asked_for_and_allowed(self, study, counted):
+        outcome = study(overrides=[*self.HIDING, "screening.follow=true"])
+        assert len(outcome.screening_runs) == 25
+        assert len(counted.asked) == len(set(counted.asked))
+        folded = outcome.screening_runs.design.coded
+        assert_array_equal(folded[12:24], -folded[:12])
+        back = read_run(outcome.path)
+        assert len(back.screening_runs) == 25
+        assert back.kept == outcome.kept
+
+    def test_the_foldover_is_not_run_where_main_effects_suffice(self, study):
+        outcome = study(overrides=[*self.HIDING[:2], "screening.follow=true", "screening.tolerance=0.1"])
+        assert len(outcome.screening_runs) == 13
+        assert outcome.kept == ("a", "b", "c")
+
     def test_nobody_acts(self, study, counted):
         with pytest.raises(InputError, match=r"no response moves .* screening\.keep"):
             study(oracle="all_still")
