@@ -4,6 +4,8 @@ import hashlib
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 import surrogates
 from experiments.designs import Design, Random
 from experiments.runs import Runs
@@ -12,7 +14,7 @@ from surrogates import Inversion, RoundTrip, Surrogate, Verdict, certify, errors
 
 from .config import dump_config
 from .errors import InputError, TooManyFailures
-from .study import Study
+from .study import Study, check_levels, check_runs
 from .version import __version__
 
 INVERSE = "inverse"
@@ -52,7 +54,13 @@ def kept_factors(study: Study, screening: Screening) -> tuple[str, ...]:
 def fill_design(study: Study, kept: tuple[str, ...]) -> Design:
     """A filling design on the kept factors; the others stay at the centre of their range."""
     inner = study.space.select(kept)
-    return study.fill_method(len(inner)).generate(inner, study.seed("fit")).embed(study.space)
+    try:
+        design = study.fill_method(len(inner)).generate(inner, study.seed("fit"))
+    except ValueError as error:  # What a method asks of the number of factors shows only now.
+        raise InputError(f"fit.design: {error}") from None
+    check_runs(study, len(inner), len(design))
+    check_levels(study.config, min(len(np.unique(column)) for column in design.coded.T))
+    return design.embed(study.space)
 
 
 def validation_design(study: Study) -> Design:

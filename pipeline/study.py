@@ -118,17 +118,29 @@ def _check_fill(study: Study) -> None:
     n_factors = len(study.space)
     method: Any = _checked("fit.design", lambda: study.fill_method(n_factors))
     levels = getattr(method, "levels", None)
-    if levels is not None and levels <= study.config.fit.degree:
-        raise InputError(
-            f"fit.design: {levels} levels cannot show a degree of {study.config.fit.degree}; "
-            f"use levels = {study.config.fit.degree + 1} or more, or a lower fit.degree"
-        )
-    needed, n_runs = len(study.candidates(n_factors)), method.n_runs
+    if isinstance(levels, int):
+        check_levels(study.config, levels)
+    if method.n_runs is not None:
+        check_runs(study, n_factors, method.n_runs)
+
+
+def check_runs(study: Study, n_factors: int, n_runs: int) -> None:
+    """Refuse a filling design with fewer runs than candidate terms."""
+    needed = len(study.candidates(n_factors))
     if n_runs < needed:
         raise InputError(
             f"fit.design: {n_runs} runs are fewer than the {needed} terms of a degree-{study.config.fit.degree} "
             f"polynomial in {n_factors} factors; use n_runs = {needed} or more, a lower fit.degree, "
             "fit.interactions = false, or leave n_runs out to have it sized from the factors that act"
+        )
+
+
+def check_levels(config: Config, levels: int) -> None:
+    """Refuse a filling design whose factors take too few levels for the degree."""
+    if levels <= config.fit.degree:
+        raise InputError(
+            f"fit.design: {levels} levels cannot show a degree of {config.fit.degree}; use {config.fit.degree + 1} "
+            f"levels or more (method = 'uniform', levels = {config.fit.degree + 1}), or a lower fit.degree"
         )
 
 

@@ -93,7 +93,7 @@ def get(method: str, settings: Mapping[str, Any] | None = None, at_least: float 
     if method not in METHODS:
         raise ValueError(f"unknown design {method!r}{suggestion(method, METHODS)}")
     kind, cls, chosen = f"design {method!r}", METHODS[method], dict(settings or {})
-    if at_least is None or "n_runs" in chosen:
+    if at_least is None or any(name in chosen for name in getattr(cls, "sized_by", ("n_runs",))):
         return build(kind, cls, chosen)
     # Which sizes a method allows is the method's own business: take the first that it does not refuse.
     smallest = ceil(at_least)

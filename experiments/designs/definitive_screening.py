@@ -51,6 +51,7 @@ class DefinitiveScreening:
     method: ClassVar[str] = "definitive_screening"
     title: ClassVar[str] = "definitive screening design"
     summary: ClassVar[str] = "three-level screening: main effects free of interactions, curvature visible"
+    levels: ClassVar[int] = 3
 
     n_runs: int | None = parameter(None, "runs", "9, 13, 17, 21, …; default is the smallest that holds the factors")
     fake_factors: int = parameter(0, "columns", "least number of columns without a factor, which measure noise")

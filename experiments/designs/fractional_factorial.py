@@ -56,6 +56,7 @@ class FractionalFactorial:
     method: ClassVar[str] = "fractional_factorial"
     title: ClassVar[str] = "fractional factorial"
     summary: ClassVar[str] = "regular two-level fraction of minimum aberration, its aliases listed"
+    levels: ClassVar[int] = 2
 
     n_runs: int | None = parameter(None, "runs", "a power of two; default is the smallest of the wanted resolution")
     resolution: int | None = parameter(None, "factors", "3, 4, 5, …: length of the shortest word; default 4")

@@ -42,6 +42,8 @@ class FullFactorial:
     title: ClassVar[str] = "full factorial"
     summary: ClassVar[str] = "every combination of the levels, which may differ between factors"
 
+    sized_by: ClassVar[tuple[str, ...]] = ("n_runs", "levels")
+
     levels: int | str | None = parameter(None, "levels", "one number, or one a factor: '2, 3, 3'; default is 2")
     n_runs: int | None = parameter(None, "runs", "split evenly into levels; default is what levels multiply to")
 

@@ -57,6 +57,7 @@ class PlackettBurman:
     method: ClassVar[str] = "plackett_burman"
     title: ClassVar[str] = "Plackett–Burman design"
     summary: ClassVar[str] = "two-level orthogonal screening of main effects, with dummy columns"
+    levels: ClassVar[int] = 2
 
     n_runs: int | None = parameter(None, "runs", "a multiple of 4 before additions; default leaves four dummies")
     foldover: bool = parameter(False, "true/false", FOLDOVER)

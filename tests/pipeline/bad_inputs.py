@@ -180,6 +180,16 @@ BAD = [
         '[screening.design]\nmethod = "random"\nn_runs = 1000000000000',
         r"screening\.design",
     ),
+    appended(
+        "filling with two levels",
+        '[fit.design]\nmethod = "plackett_burman"',
+        r"fit\.design: 2 levels cannot show a degree of 2; use 3 levels or more",
+    ),
+    appended(
+        "a full factorial of unreadable levels",
+        '[fit.design]\nmethod = "full_factorial"\nlevels = "3, x"',
+        r"fit\.design: levels of a full factorial must be whole numbers of at least 1, got '3, x'",
+    ),
     # Exports.
     appended(
         "unknown export", '[export]\ntargets = ["c9"]', r"export\.targets: unknown export 'c9'; did you mean 'c99'\?"

@@ -320,6 +320,27 @@ class TestScreening:
         few = study("few", overrides=["fit.degree=1", "fit.interactions=false", "fit.design.levels=5"])
         assert len(few.fit_runs) == 10
 
+    def filled_by(self, folder: Path, *settings: str) -> pipeline.Outcome:
+        """The counted study with another filling design than the uniform one."""
+        config = folder / "study.toml"
+        config.write_text(config_text(), encoding="utf-8")
+        return pipeline.run(config, folder / "out", ["validation.n_runs=20", *settings])
+
+    @pytest.mark.parametrize("method", ["definitive_screening", "d_optimal", "sobol", "halton", "latin_hypercube"])
+    def test_any_design_of_three_levels_fills(self, counted, tmp_path, no_report, method):
+        outcome = self.filled_by(tmp_path, f"fit.design.method={method}")
+        assert outcome.kept == ("a", "b", "c")
+        assert max(e.max_relative for e in outcome.model.validation) < 1e-9
+
+    def test_a_full_factorial_fills(self, counted, tmp_path, no_report):
+        outcome = self.filled_by(tmp_path, "fit.design.method=full_factorial", "fit.design.levels=3")
+        assert len(outcome.fit_runs) == 27
+
+    def test_a_full_factorial_for_another_number_of_factors_is_refused(self, counted, tmp_path, no_report):
+        settings = ["fit.design.method=full_factorial", 'fit.design.levels="3, 3, 3, 3"']
+        with pytest.raises(InputError, match=r"fit\.design: levels '3, 3, 3, 3' of a full factorial are for 4 factors"):
+            self.filled_by(tmp_path, *settings)
+
     def test_a_given_n_runs_is_kept(self, study):
         assert len(study(overrides=["fit.design.n_runs=24"]).fit_runs) == 24
 
