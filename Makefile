@@ -22,7 +22,7 @@ smoke: $(VENV)/.ready
 	$(BIN)/flexdoce run configs/smoke.toml
 
 test: $(VENV)/.ready-dev
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile
 
 lint: $(VENV)/.ready-dev
 	$(BIN)/ruff check .
