@@ -98,7 +98,7 @@ def summary(outcome: Outcome) -> None:
 
 def _adequacy(outcome: Outcome) -> None:
     """Whether main effects tell who acts, and what the screening asks for if not."""
-    found = outcome.screening.adequacy(outcome.study.config.screening.tolerance)
+    found = outcome.adequacy
     if found.adequate:
         return
     named = ", ".join(r.response for r in found.responses if r.reasons)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from experiments.designs import Design, Random
 from experiments.runs import Runs
-from experiments.screening import Screening
+from experiments.screening import Adequacy, Screening
 from surrogates import RoundTrip, Surrogate, dumps, exports, loads, obstacle
 
 from . import stages, tables
@@ -55,6 +55,11 @@ class Outcome:
     round_trip: RoundTrip | None
     shortfalls: tuple[str, ...]
     seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def adequacy(self) -> Adequacy:
+        """Whether main effects tell who acts."""
+        return stages.adequacy(self.study, self.screening)
 
     @property
     def obstacle(self) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 import surrogates
 from experiments.designs import Design, Random
 from experiments.runs import Runs
-from experiments.screening import NextDesign, Screening, screen
+from experiments.screening import Adequacy, NextDesign, Screening, screen
 from surrogates import Inversion, RoundTrip, Surrogate, Verdict, certify, errors, obstacle, round_trip
 
 from .config import dump_config
@@ -28,10 +28,14 @@ def screened(study: Study, runs: Runs) -> Screening:
     return screen(runs, study.config.screening.alpha, study.oracle.resolution)
 
 
+def adequacy(study: Study, screening: Screening) -> Adequacy:
+    """Whether main effects tell who acts, by the config's tolerance."""
+    return screening.adequacy(study.config.screening.tolerance)
+
+
 def following(study: Study, screening: Screening) -> Design | None:
     """The foldover, first half included, if the screening asks for it and the config lets it be run."""
-    adequacy = screening.adequacy(study.config.screening.tolerance)
-    return study.folded_screening if adequacy.next_design is NextDesign.FOLDOVER else None
+    return study.folded_screening if adequacy(study, screening).next_design is NextDesign.FOLDOVER else None
 
 
 def kept_factors(study: Study, screening: Screening) -> tuple[str, ...]:
@@ -40,8 +44,8 @@ def kept_factors(study: Study, screening: Screening) -> tuple[str, ...]:
     Where main effects are not the whole story, also those that may act behind them; all, if none can be
     ruled out: dropping one would be a guess.
     """
-    adequacy = screening.adequacy(study.config.screening.tolerance)
-    acting = screening.active_factors if adequacy.adequate else adequacy.keep
+    found = adequacy(study, screening)
+    acting = screening.active_factors if found.adequate else found.keep
     wanted = {*acting, *study.config.screening.keep}
     if not wanted:
         raise InputError(

@@ -58,7 +58,7 @@ def joined(arrays: FrameArrays, plan: Plan) -> Joined:
 def stiffness(arrays: FrameArrays, which: Joined, geometry: Geometry) -> Array:
     """Entries of the stiffness of the bodies about their origins, in global axes, (6, 6, n_entries, n_points), SI."""
     x, nodes = jnp.asarray(geometry.coordinates), arrays.ends.T
-    near, between, far = (_any if arrays.is_curved.any() else _straight)(arrays, geometry)
+    near, between, far = (_general if arrays.is_curved.any() else _straight)(arrays, geometry)
 
     def arms(side: int, members: NDArray[np.int64]) -> Array | None:
         node = nodes[side][members]
@@ -103,7 +103,7 @@ def _straight(arrays: FrameArrays, geometry: Geometry) -> tuple[Blocks, Blocks, 
     return (force, couple, back, same), (-force, couple, -back, other), (force, -couple, -back, same)
 
 
-def _any(arrays: FrameArrays, geometry: Geometry) -> tuple[Blocks, Blocks, Blocks]:
+def _general(arrays: FrameArrays, geometry: Geometry) -> tuple[Blocks, Blocks, Blocks]:
     """The same of members that may be arcs."""
     shape = shapes_of(arrays, geometry)
     each = jax.vmap(jax.vmap(lambda shape, p: member_stiffness(shape, p)[0], -1, -1), -1, -1)

@@ -49,6 +49,7 @@ def directions(
     if toward.geometry is None:
         return Directions(pulled, still, motion)
     change = jax.tree.map(lambda g, d: spread(d, g, len(pulled)), geometry, toward.geometry)
+    geometry = jax.tree.map(lambda g, d: np.broadcast_to(g, d.shape[1:]), geometry, change)
     rods, rest = _rates(arrays, topology, unit)(geometry, change)
     # Loads depend on the places of their nodes linearly, by their arms.
     moved = np.stack([dead(np.asarray(one), loads) - dead(0 * place, loads) for one in change.coordinates])
@@ -56,9 +57,19 @@ def directions(
 
 
 def spread(change: Any, of: Any, m: int) -> Floats:
-    """`change`, of shape (m, …) or a scalar, repeated to the shape (m, *of.shape)."""
-    change = np.asarray(change, dtype=np.float64)
-    return np.broadcast_to(change if change.ndim else change[None], (m, *np.shape(of)))
+    """`change`, of shape (m, …) or (1,), repeated to the shape (m, *of.shape), or that with all points.
+
+    ``ValueError`` if it does not fit.
+    """
+    points = max(np.shape(of)[-1], np.shape(change)[-1] if np.ndim(change) > 1 else 1)
+    shape = (m, *np.shape(of)[:-1], points)
+    try:
+        return np.broadcast_to(np.asarray(change, dtype=np.float64), shape)
+    except ValueError:
+        raise ValueError(
+            f"geometry_directions must have the shapes of a geometry with the {m} directions as first axis; "
+            f"got {np.shape(change)} where {shape} is wanted"
+        ) from None
 
 
 @lru_cache(maxsize=32)

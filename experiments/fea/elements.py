@@ -64,8 +64,8 @@ def rotation(shape: Shapes) -> Array:
 
 def shear_parameters(length: Array, p: Properties) -> tuple[Array, Array]:
     """Φ_y = 12 E I_z / (G A_sy L²) and Φ_z = 12 E I_y / (G A_sz L²); zero for an infinite shear area."""
-    phi_y = 12 * p.young * p.second_moment_z * _inverse(p.shear_area_y) / (p.shear * length**2)
-    phi_z = 12 * p.young * p.second_moment_y * _inverse(p.shear_area_z) / (p.shear * length**2)
+    phi_y = 12 * p.young * p.second_moment_z * inverse_area(p.shear_area_y) / (p.shear * length**2)
+    phi_z = 12 * p.young * p.second_moment_y * inverse_area(p.shear_area_z) / (p.shear * length**2)
     return phi_y, phi_z
 
 
@@ -91,8 +91,8 @@ def flexibility(shape: Shapes, p: Properties, s: Array | float = 1.0) -> Array:
     compliance = jnp.stack(
         [
             1 / (p.young * p.area),
-            _inverse(p.shear_area_y) / p.shear,
-            _inverse(p.shear_area_z) / p.shear,
+            inverse_area(p.shear_area_y) / p.shear,
+            inverse_area(p.shear_area_z) / p.shear,
             1 / (p.shear * p.torsion_constant),
             1 / (p.young * p.second_moment_y),
             1 / (p.young * p.second_moment_z),
@@ -141,7 +141,7 @@ def _bending(length: Array, bending_stiffness: Array, phi: Array) -> Array:
     return bending_stiffness / (length**3 * (1 + phi)) * k
 
 
-def _inverse(shear_area: Array) -> Array:
+def inverse_area(shear_area: Array) -> Array:
     """1/A, zero where A is infinite; both branches are finite, so that derivatives are too."""
     finite = jnp.isfinite(shear_area)
     return jnp.where(finite, 1 / jnp.where(finite, shear_area, 1.0), 0.0)

@@ -23,7 +23,7 @@ from . import scaling
 from .arrays import FrameArrays, frame_arrays
 from .blockloads import dead_loads, follower_loads, prescribed
 from .condensed import Problem, topology
-from .directions import Toward, directions
+from .directions import Toward, directions, spread
 from .equilibria import Described, Equilibria, Path, equilibria, everything, joined
 from .kernel import Kernel, Settled, View, taken
 from .loads import checked, checked_motions
@@ -169,8 +169,9 @@ class NonlinearSolver:
             As for :meth:`read`. What `read` holds constant, say a distance of fibres, stays constant.
         load_directions, motion_directions : array-like, shape (m, n_nodes, 6), optional
         geometry_directions : Geometry, optional
-            Changes of each array of a geometry, with m as first axis; :func:`.parameters.geometry_rates`
-            makes them from a function that builds the frame. Scalars and axes of 1 are repeated.
+            Changes of each array of a geometry, with m as first axis and 1 or n_cases as last;
+            :func:`.parameters.geometry_rates` makes them from a function that builds the frame. Scalars
+            and axes of 1 are repeated.
 
         Returns
         -------
@@ -249,11 +250,12 @@ class NonlinearSolver:
         toward: Toward | None = None,
     ) -> tuple[Settled, Any]:
         """One chunk, filled up with its last case, and the centres of its sections at rest."""
-        full = rows[np.minimum(np.arange(CHUNK), len(rows) - 1)]
+        full = filled(rows)
         loads, motions, followers = (array[full] for array in given)
         here = taken(geometry, full)
         problem, centre = self.problem(loads, motions, followers, here)
         if toward is not None:
+            toward = toward._replace(geometry=taken(toward.geometry, full))
             at = scaling.geometry(self.arrays) if here is None else here
             along = directions(self.arrays, self.kernel.topology, self.units, toward, at, loads)
             problem = problem._replace(along=along)
@@ -290,6 +292,9 @@ class NonlinearSolver:
         if wrong:
             raise ValueError(f"there are {len(none)} directions of one kind and {wrong[0]} of another: give as many")
         pulls, turns, _ = self._checked(none if loads is None else loads, none if motions is None else motions, None)
+        if geometry is not None:
+            own = scaling.geometry(self.arrays)
+            geometry = jax.tree.map(lambda g, d: spread(np.atleast_1d(d), g, len(none)), own, geometry)
         return Toward(pulls, turns, geometry)
 
     @cached_property
@@ -358,6 +363,11 @@ def condense(frame: Frame, *, planar: bool = False, n_steps: int = N_STEPS) -> N
 def chunks(n_cases: int) -> list[NDArray[np.int64]]:
     """The rows of each chunk."""
     return [np.arange(start, min(start + CHUNK, n_cases)) for start in range(0, n_cases, CHUNK)]
+
+
+def filled(rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The rows of a chunk, the last repeated until it is full."""
+    return rows[np.minimum(np.arange(CHUNK), len(rows) - 1)]
 
 
 def in_threads(function: Callable[[NDArray[np.int64]], Any], parts: list[NDArray[np.int64]]) -> Iterator[Any]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .arrays import FrameArrays
 from .condensed import Space
-from .elements import Properties, along
+from .elements import Properties, along, inverse_area
 from .planar import Planar
 from .rods import Rods
 from .shapes import Shapes, shapes
@@ -100,7 +100,7 @@ def rods(arrays: FrameArrays, space: Space, unit: Units, geometry: Geometry, sha
     offsets = [(x[:, n] - x[:, arrays.master[n]]) / unit.length for n in (a, b)]
     length = shape.length / unit.length
     p, f = geometry.properties, unit.force
-    shear = [_inverse(p.shear_area_y) / p.shear, _inverse(p.shear_area_z) / p.shear]
+    shear = [inverse_area(p.shear_area_y) / p.shear, inverse_area(p.shear_area_z) / p.shear]
     bending = f * unit.length**2
     ones = jnp.ones_like(length)
     if isinstance(space, Planar):
@@ -144,9 +144,3 @@ def _planar(shape, offsets: list[Array], length: Array, give: list[Array], ones:
 
 def _stacked(parts: list[Array], ones: Array) -> Array:
     return jnp.stack([part * ones for part in parts])
-
-
-def _inverse(shear_area: Array) -> Array:
-    """1/A, zero where A is infinite; both branches are finite, so that derivatives are too."""
-    finite = jnp.isfinite(shear_area)
-    return jnp.where(finite, 1 / jnp.where(finite, shear_area, 1.0), 0.0)

@@ -23,7 +23,7 @@ from .kernel import in_blocks, taken
 from .loads import checked
 from .mechanisms import check_held
 from .model import Frame
-from .nonlinear import CHUNK, chunks, in_threads
+from .nonlinear import CHUNK, chunks, filled, in_threads
 from .precision import in_float64
 from .scaling import Geometry
 from .spatial import Spatial
@@ -68,8 +68,7 @@ def linear_displacements(
 
     @in_float64
     def solved(rows: NDArray[np.int64]) -> NDArray[np.float64]:
-        full = rows[np.minimum(np.arange(CHUNK), len(rows) - 1)]
-        some = taken(geometry, full)
+        some = taken(geometry, filled(rows))
         some = some._replace(coordinates=np.broadcast_to(some.coordinates, (*np.shape(some.coordinates)[:-1], CHUNK)))
         return np.asarray(displaced(some, loads[:, list(loaded)]))[..., : len(rows)].transpose(3, 1, 2, 0)
 

@@ -45,7 +45,7 @@ def _content(outcome: Outcome, provenance: Mapping[str, Any]) -> dict[str, Any]:
         "shortfalls": outcome.shortfalls,
         "requirements": config.require.model_dump(exclude_none=True),
         "activity": views.activity(outcome),
-        "adequacy": outcome.screening.adequacy(config.screening.tolerance),
+        "adequacy": outcome.adequacy,
         "kept": outcome.kept,
         "screening_title": METHODS[config.screening.design.method].title,
         "screening_runs": len(outcome.screening_runs),

@@ -129,6 +129,17 @@ class TestDerivatives:
         alone = solver.differentiate(read, *given, load_directions=push)
         assert_allclose(found[1] - found[0], alone, rtol=1e-9, atol=1e-9 * np.abs(found[1]).max())
 
+    def test_directions_may_differ_from_case_to_case(self):
+        frame = build(*AT.values())
+        solver, given = condense(frame, planar=True, n_steps=4), values(frame)
+        rates = geometry_rates(build, list(AT.values()))
+        each = jax.tree.map(lambda part: np.concatenate([part, 3 * part], axis=-1), rates)
+        found = solver.differentiate(read, *given, geometry_directions=each)
+        once = solver.differentiate(read, *given, geometry_directions=rates)
+        expected = once * np.array([1.0, 3.0])[:, None, None]
+        # Another program, whose sums are rounded in another order.
+        assert_allclose(found, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+
 
 class TestErrors:
     def test_no_direction(self):
@@ -142,6 +153,14 @@ class TestErrors:
         with pytest.raises(ValueError, match="2 directions of one kind and 6 of another"):
             condense(frame, planar=True).differentiate(
                 read, *values(frame), load_directions=values(frame)[0], geometry_directions=rates
+            )
+
+    def test_directions_of_another_shape(self):
+        frame = build(*AT.values())
+        rates = geometry_rates(build, list(AT.values()))
+        with pytest.raises(ValueError, match=r"geometry_directions must have the shapes of a geometry with the 6 dir"):
+            condense(frame, planar=True).differentiate(
+                read, *values(frame), geometry_directions=rates._replace(coordinates=np.ones((6, 2, 1)))
             )
 
     def test_a_step_must_be_positive(self):
