@@ -11,7 +11,7 @@ from experiments import designs, oracles
 from experiments.designs import Design, DesignMethod
 from experiments.factors import FactorSpace
 from experiments.oracles import Oracle
-from experiments.screening import contrast_columns
+from experiments.screening import count_contrasts
 from experiments.terms import Terms
 from surrogates import Surrogate, exports
 
@@ -84,13 +84,13 @@ def resolve(config: Config) -> Study:
     method = _checked("screening.design", lambda: designs.get(screening.design.method, screening.design.settings))
     design = _checked("screening.design", lambda: method.generate(space, _seed(config, "screening")))
     try:
-        contrast_columns(design)
+        n_contrasts = count_contrasts(design)
     except ValueError as error:
         named = f"screening.design: {screening.design.method!r} is not a two-level design that can be screened with"
         raise InputError(f"{named} ({error}); use 'plackett_burman'") from None
-    if design.coded.shape[1] + design.dummies.shape[1] < 3:
+    if n_contrasts < 3:
         raise InputError(
-            "screening.design: Lenth's method needs at least 3 columns, factors and dummies together; use more runs"
+            "screening.design: Lenth's method needs at least 3 contrasts, dummies and products included; use more runs"
         )
     for name in screening.keep:
         _checked("screening.keep", lambda name=name: space.index(name))

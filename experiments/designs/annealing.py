@@ -1,210 +1,156 @@
-"""Exchange annealing: lowers a discrepancy by exchanging two entries of one column at a time, compiled by JAX."""
+"""Exchange annealing: lowers a discrepancy by exchanging two entries of one column at a time."""
 
-from collections.abc import Callable
-from functools import cache
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .discrepancy import Criterion
 
-HOTTEST, COLDEST = 0.3, 1.0
-"""First and last temperature: HOTTEST / √n and COLDEST / n^1.5 of the typical change at the start, n rows moving."""
+if TYPE_CHECKING:
+    from .exchanges import Walker
 
-COARSE = 12.0
-"""With q levels the last temperature is 1 + COARSE / q times as high: the fewer levels, the larger the smallest step.
-All three were measured between 16 and 100 runs and 4 and 100 levels."""
+Ints = NDArray[np.int64]
+
+HOTTEST, COLDEST = 0.2, 0.1
+"""First temperature: HOTTEST / √h of the median change at a local optimum, h runs kept; the last: COLDEST of the first.
+Measured between 16 and 100 runs and 4 and 100 levels."""
 
 QUENCH = 20
 """One part in so many of the budget ends the annealing at no temperature: straight down into the nearest dip."""
 
-LEG = 3_000
-"""Exchanges tried, over n², that one annealing needs before a second one from a new start is worth its time."""
+FEW = 20
+"""With fewer visits to each column than these there is no time to anneal: straight down."""
 
-HEATS = (1.0, 0.6, 1.8)
-"""Heats of the first annealings; which one is best differs from problem to problem, so the others take the winner's."""
-
-NOISE = 400_000
-"""Random numbers drawn at a time: 3 MB, and a few hundredths of a second between two fresh sums."""
-
-PADDED = 8
-"""Columns are filled up to a multiple of this, so that one compiled program serves many numbers of factors."""
+CHUNK = 1000
+"""Visits between two fresh sums of the products, so that rounding cannot pile up over a long walk."""
 
 
-def prices(criterion: Criterion, levels: Any, partner: Any, off: Any, diagonal: Any, lone: Any, ones: Any) -> Any:
-    """Change of the discrepancy if each row exchanged its level with its partner, shape (n,), in O(n) work a row.
+@dataclass(frozen=True)
+class Start:
+    """What an annealing starts from.
 
     Parameters
     ----------
-    criterion : Criterion
-    levels : array, shape (n,)
-        The column, −1/2 … +1/2 from the centre of the cube.
-    partner : array of int, shape (n,)
-        An involution: the partner's partner is the row itself.
-    off, diagonal : array, shape (n, n) and (n,)
-        Two-point products of all *other* columns, off the diagonal (0 on it) and on it.
-    lone, ones : array, shape (n,)
-        One-point products of all other columns; ones.
+    runs : ndarray of int, shape (h, s)
+        Levels 0 … levels − 1.
+    levels : int
+    mirrored : bool
+        The image of every run, level q − 1 − k for k, belongs to the design too.
+    still : int
+        The first so many runs do not move.
     """
-    n = len(levels)
-    pair, single, other = criterion.pair, criterion.single, levels[partner]
-    # A product with ones sums in vector registers, where a plain sum must keep its order.
-    moved = (off * (pair(other[:, None], levels[None, :]) - pair(levels[:, None], levels[None, :]))) @ ones
-    # The partner moves too, and what the two share stays as it is.
-    shared = off[np.arange(n), partner] * (pair(other, other) - pair(levels, other))
-    own = diagonal * (pair(other, other) - pair(levels, levels))
-    change = (2.0 * (moved - shared) + own) / n**2 - 2.0 / n * lone * (single(other) - single(levels))
-    return change + change[partner]
+
+    runs: Ints
+    levels: int
+    mirrored: bool = False
+    still: int = 0
+
+    @property
+    def design(self) -> Ints:
+        """All runs, images included, shape (n, s)."""
+        return np.vstack([self.runs, self.levels - 1 - self.runs]) if self.mirrored else self.runs
+
+    def value(self, criterion: Criterion) -> float:
+        """Squared discrepancy, level k of q counting as (2k + 1)/(2q)."""
+        return criterion.value((self.design + 0.5) / self.levels)
+
+    def with_runs(self, runs: Ints) -> "Start":
+        """The same with other levels."""
+        return Start(runs, self.levels, self.mirrored, self.still)
 
 
-def anneal(
-    start: NDArray[np.float64],
-    criterion: Criterion,
-    budget: int,
-    rng: np.random.Generator,
-    movable: int | None = None,
-    heat: float = 1.0,
-) -> NDArray[np.float64]:
+def anneal(start: Start, criterion: Criterion, budget: int, rng: np.random.Generator, heat: float = 1.0) -> Start:
     """The design of lowest discrepancy met while trying `budget` exchanges, never worse than `start`.
 
     Parameters
     ----------
-    start : ndarray, shape (n, s)
-        Levels from the centre of the cube, −1/2 … +1/2.
+    start : Start
     criterion : Criterion
     budget : int
-        Exchanges tried, in rounds of `movable` // 2 exchanges that share no row.
+        Exchanges tried, in sweeps over all pairs of runs of one column.
     rng : numpy.random.Generator
-    movable : int, optional
-        Only the last so many rows move; all of them by default.
     heat : float
-        Scales all temperatures; below 1 for a start that is good already.
+        Scales all temperatures; 0 goes straight down.
 
     Notes
     -----
     The exchange search of Fang, Lu and Winker (2003), "Lower bounds for centered and wrap-around
     L2-discrepancies and construction of uniform designs by threshold accepting", J. Complexity 19,
-    692–711, with random (Metropolis) thresholds and geometric cooling. One round prices disjoint
-    exchanges of a column together and makes the one that clears its threshold by most; a column is
-    visited for several rounds, in which the products of the other columns stay. The compiled loop
-    takes all its random numbers from `rng`.
+    692–711, with random (Metropolis) thresholds and geometric cooling. While a column is visited,
+    the part of the discrepancy that each run would have at each level is at hand, so an exchange is
+    priced in a few operations; making one costs O(n q).
     """
-    n, s = start.shape
-    free = n if movable is None else movable
-    rounds = max(1, free // 2)
-    visits = -(-budget // rounds**2)
-    if free < 2 or visits == 0 or s == 1:  # the order of a single column does not matter
-        return start.copy()
-    # Rows that move come first inside: a round pairs row i with row (r − i) modulo `movable`.
-    state = _State(np.roll(start, free, axis=0), criterion, free)
-    coarse = 1.0 + COARSE / len(np.unique(start))
-    first, last = HOTTEST / free**0.5 * heat, COLDEST / free**1.5 * heat * coarse
-    temperatures = state.typical_change(rng) * np.geomspace(max(first, last), last, visits)
-    temperatures[visits - visits // QUENCH :] = 0.0
-    chunk = max(1, NOISE // (rounds * n))
-    for begin in range(0, visits, chunk):
-        cooling = temperatures[begin : begin + chunk]
-        noise, pairing = np.zeros((chunk, rounds, n)), np.zeros((chunk, rounds), dtype=np.int64)
-        noise[: len(cooling)] = rng.standard_exponential((len(cooling), rounds, n))
-        pairing[: len(cooling)] = rng.integers(free, size=(len(cooling), rounds))
-        state.walk(begin, cooling, pairing, noise)
-    return np.roll(state.best, -free, axis=0)
+    runs = start.runs
+    moving = len(runs) - start.still
+    if moving < 1 or budget < 1 or runs.shape[1] == 1 or (moving < 2 and not start.mirrored):
+        return start  # the order of a single column does not matter
+    sweeps = 1 + start.levels // 32  # a visit begins with O(n² + n q²) work, a sweep is O(n²)
+    visits = -(-budget // (sweeps * tried(moving, start.mirrored)))
+    temperatures = np.zeros(visits)
+    if visits > FEW * runs.shape[1] and heat > 0.0:
+        first = HOTTEST / len(runs) ** 0.5 * heat * _typical_change(start, criterion, rng)
+        temperatures = first * np.geomspace(1.0, COLDEST, visits)
+        temperatures[visits - visits // QUENCH :] = 0.0
+    return _walked(start, criterion, temperatures, sweeps, rng)
 
 
-def legs(budget: int, movable: int) -> list[int]:
-    """Budgets of the annealings that `budget` is spent on, every one from a new start.
-
-    A longer annealing pays at first, more of them later: their number grows as the 0.7th power of
-    the budget.
-    """
-    count = max(1, int((budget / (LEG * max(movable, 2) ** 2)) ** 0.7))
-    return [int(share) for share in np.diff(np.linspace(0, budget, count + 1).astype(np.int64))]
+def tried(moving: int, mirrored: bool) -> int:
+    """Exchanges of one sweep over a column with `moving` runs: of two runs, or of one with its own image."""
+    pairs = moving * (moving - 1) // 2
+    return 2 * pairs + moving if mirrored else pairs
 
 
-class _State:
-    """A design under way, and the best one met."""
+def _walked(
+    start: Start, criterion: Criterion, temperatures: NDArray[np.float64], sweeps: int, rng: np.random.Generator
+) -> Start:
+    from .exchanges import walk  # the compiler takes 0.3 s to import, and a surrogate that only predicts needs none
 
-    def __init__(self, design: NDArray[np.float64], criterion: Criterion, movable: int) -> None:
-        self.design, self.best = design.copy(), design.copy()
-        self.criterion, self.movable = criterion, movable
-        self.value = self.lowest = criterion.value(design + 0.5)
-
-    def typical_change(self, rng: np.random.Generator) -> float:
-        """Mean size of what an exchange changes, here."""
-        n = len(self.design)
-        once, twice = self.criterion.products(self.design)
-        rows, found = np.arange(n), []
-        for column in self.design.T[: 4 * PADDED]:
-            lone = once / self.criterion.single(column)
-            rest = twice / self.criterion.pair(column[:, None], column[None, :])
-            partner = np.where(rows < self.movable, (rng.integers(self.movable) - rows) % self.movable, rows)
-            off = rest * (1.0 - np.eye(n))
-            found.append(prices(self.criterion, column, partner, off, np.diag(rest), lone, np.ones(n)))
-        sizes = np.abs(found)
-        return float(sizes[sizes > 1e-14].mean()) if (sizes > 1e-14).any() else 1.0
-
-    def walk(self, begin: int, cooling: NDArray[np.float64], pairing: NDArray[np.int64], noise: Any) -> None:
-        """Visit one column for each temperature in `cooling`, starting with column `begin` modulo s."""
-        import jax  # half a second to import, and not needed by a surrogate that only predicts
-
-        n, s = self.design.shape
-        padding = np.zeros((-s % PADDED, n))
-        # The products are summed afresh here, so rounding cannot pile up over a long walk.
-        once, twice = self.criterion.products(self.design)
-        temperatures = np.resize(cooling, len(pairing))
-        order = (np.arange(len(pairing)) + begin) % s
-        columns, best = (np.vstack([x.T, padding]) for x in (self.design, self.best))
-        start = (columns, once, twice, self.value, best, self.lowest)
-        with jax.enable_x64(True):
-            walk = _compiled(self.criterion)
-            end = walk(start, np.ones(n), self.movable, len(cooling), order, temperatures, pairing, noise)
-        self.design, self.best = (np.asarray(end[i])[:s].T for i in (0, 4))
-        self.value, self.lowest = (self.criterion.value(x + 0.5) for x in (self.design, self.best))
+    now = best = start
+    for begin in range(0, len(temperatures), CHUNK):
+        walker = _walker(now, best, criterion)
+        walk(walker, start.still, temperatures[begin : begin + CHUNK], sweeps, rng)
+        now = start.with_runs(np.ascontiguousarray(walker.columns.T))
+        found = start.with_runs(np.ascontiguousarray(walker.best.T))
+        if found.value(criterion) < best.value(criterion):
+            best = found
+    return best
 
 
-@cache
-def _compiled(criterion: Criterion) -> Callable[..., Any]:
-    """The walk over columns for one criterion, compiled once for each number of runs."""
-    import jax
-    import jax.numpy as jnp
+def _typical_change(start: Start, criterion: Criterion, rng: np.random.Generator) -> float:
+    """Median size of what an exchange of two runs changes, at the nearest dip."""
+    dip = _walked(start, criterion, np.zeros(2 * start.runs.shape[1]), 1, rng)
+    walker = _walker(dip, dip, criterion)
+    free = slice(start.still, None)
+    sizes = np.abs([changes(walker, k)[free, free] for k in range(len(walker.columns))])
+    return float(np.median(sizes[sizes > 0.0])) if sizes.any() else 0.0
 
-    def walk(start, ones, movable, visits, order, temperatures, pairing, noise):
-        n = len(ones)
-        rows = jnp.arange(n)
 
-        def round_(i, inner, visit, off, diagonal, lone):
-            levels, value, best, lowest = inner
-            partner = jnp.where(rows < movable, (pairing[visit, i] - rows) % movable, rows)
-            change = prices(criterion, levels, partner, off, diagonal, lone, ones)
-            # Metropolis: −T·log(uniform) is T times an exponential number.
-            margin = change - temperatures[visit] * noise[visit, i][jnp.minimum(rows, partner)]
-            margin = jnp.where(levels != levels[partner], margin, jnp.inf)
-            row = jnp.argmin(margin)
-            made = margin[row] < 0.0
-            chosen = made & ((rows == row) | (rows == partner[row]))
-            levels = jnp.where(chosen, levels[partner], levels)
-            value = value + jnp.where(made, change[row], 0.0)
-            better = value < lowest - 1e-13
-            return levels, value, jnp.where(better, levels, best), jnp.where(better, value, lowest)
+def changes(walker: "Walker", k: int) -> NDArray[np.float64]:
+    """Change of the discrepancy if two runs exchanged their levels of factor `k`, shape (h, h)."""
+    from .exchanges import visited
 
-        def visit_(visit, outer):
-            columns, once, twice, value, best, lowest = outer
-            levels = columns[order[visit]]
-            rest = twice / criterion.pair(levels[:, None], levels[None, :])
-            lone = once / criterion.single(levels)
-            off, diagonal = rest * (1.0 - jnp.eye(n)), jnp.diagonal(rest)
-            levels, value, found, least = jax.lax.fori_loop(
-                0,
-                pairing.shape[1],
-                lambda i, inner: round_(i, inner, visit, off, diagonal, lone),
-                (levels, value, levels, lowest),
-            )
-            best = jnp.where(least < lowest, columns.at[order[visit]].set(found), best)
-            columns = columns.at[order[visit]].set(levels)
-            twice = rest * criterion.pair(levels[:, None], levels[None, :])
-            return columns, lone * criterion.single(levels), twice, value, best, least
+    levels, between, _, _, energy = visited(walker, k)
+    own = np.arange(len(levels)), levels
+    there = energy[:, levels] - energy[own][:, None]
+    shared = 0.0
+    for weight, pair in zip(between, walker.pair, strict=True):
+        alone = pair[levels, levels]
+        shared = shared + weight * (alone[:, None] + alone[None, :] - 2.0 * pair[levels][:, levels])
+    return there + there.T - 2.0 * shared
 
-        return jax.lax.fori_loop(0, visits, visit_, start)
 
-    return jax.jit(walk)
+def _walker(now: Start, best: Start, criterion: Criterion) -> "Walker":
+    from .exchanges import Walker, tables
+
+    images = 2 if now.mirrored else 1
+    single, pair = tables(criterion, now.levels, images)
+    columns = np.ascontiguousarray(now.runs.T, dtype=np.int64)
+    h = columns.shape[1]
+    once, twice = np.ones(h), np.ones((images, h, h))
+    for levels in columns:
+        once *= single[levels]
+        twice *= pair[:, levels][:, :, levels]
+    values = np.array([now.value(criterion), best.value(criterion)])
+    return Walker(columns, np.ascontiguousarray(best.runs.T, dtype=np.int64), once, twice, single, pair, values)

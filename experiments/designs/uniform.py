@@ -8,15 +8,16 @@ from numpy.typing import NDArray
 
 from ..factors import FactorSpace
 from ..settings import parameter
-from .annealing import HEATS, anneal, legs
+from .annealing import Start, anneal
 from .base import Design, Seed, check_count
 from .discrepancy import criterion_named
+from .search import search
 
 MOST_RUNS = 2000
 """Memory and work of one round grow with the square of the runs."""
 
 WARM = 0.2
-"""Heat of the first annealing from a given design: enough to leave a shallow dip, too little to forget the start."""
+"""Heat of an annealing from a given design: enough to leave a shallow dip, too little to forget the start."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Uniform:
         outer levels lie on the faces of the box. The discrepancy counts it as (2k − 1)/(2q).
     budget : int
         Exchanges tried. Work is counted, not seconds, so the same seed gives the same design. A
-        core tries some 5 to 10 million a second.
+        core tries some 15 to 50 million a second, the fewer the more runs and levels.
     criterion : str
         ``"centred"``, ``"mixture"`` or ``"wraparound"``: the squared L2-discrepancy to lower.
 
@@ -47,8 +48,10 @@ class Uniform:
     Notes
     -----
     Fang, Lin, Winker and Zhang (2000), "Uniform design: theory and application", Technometrics 42,
-    237–248, for the designs; :mod:`experiments.designs.annealing` for the search. A large budget
-    buys several annealings, each from a new start; the best design met counts.
+    237–248, for the designs; :mod:`experiments.designs.annealing` for the search. A fair budget
+    buys short annealings of several kinds and a long one of the kind that did best; the best design
+    met counts. Some kinds look among *mirrored* designs only, where with each run its mirror image
+    in the centre of the box is a run too: half as much to search, and often where the best ones are.
     """
 
     method: ClassVar[str] = "uniform"
@@ -57,7 +60,7 @@ class Uniform:
 
     n_runs: int = parameter(30, "runs", "a multiple of levels")
     levels: int = parameter(6, "levels", "levels per factor")
-    budget: int = parameter(12_000_000, "exchanges", "exchanges tried to lower the discrepancy")
+    budget: int = parameter(60_000_000, "exchanges", "exchanges tried to lower the discrepancy")
     criterion: str = parameter("centred", "name", "discrepancy: centred, mixture or wraparound")
 
     def __post_init__(self) -> None:
@@ -92,10 +95,9 @@ class Uniform:
             If a setting lies between the levels, or there are too many runs.
         """
         check_count("runs of a design to improve", len(design), 1, MOST_RUNS)
-        start = self._centred(self._ranks(design))
-        generator = np.random.default_rng(rng)
-        best = anneal(start, criterion_named(self.criterion), self.budget, generator, heat=WARM)
-        return self._design(design.space, best)
+        start = Start(self._ranks(design), self.levels)
+        best = anneal(start, criterion_named(self.criterion), self.budget, np.random.default_rng(rng), heat=WARM)
+        return self._design(design.space, best.runs)
 
     def augment(self, design: Design, extra: int, rng: Seed = 0) -> Design:
         """The runs of `design`, in their order, followed by `extra` new ones placed where they fill best.
@@ -121,18 +123,8 @@ class Uniform:
         return self._search(design.space, self._ranks(design), extra, rng)
 
     def _search(self, space: FactorSpace, given: NDArray[np.int64], extra: int, rng: Seed) -> Design:
-        """`given` with `extra` rows added, the best of several annealings of the added rows."""
-        generator, criterion = np.random.default_rng(rng), criterion_named(self.criterion)
-        best, lowest, winner = np.empty((0, len(space))), np.inf, HEATS[0]
-        for leg, budget in enumerate(legs(self.budget, extra)):
-            heat = HEATS[leg] if leg < len(HEATS) else winner
-            fill = np.column_stack([fewest_first(column, self.levels, extra, generator) for column in given.T])
-            start = self._centred(np.vstack([given, fill]))
-            found = anneal(start, criterion, budget, generator, movable=extra, heat=heat)
-            value = criterion.value(found + 0.5)
-            if value < lowest:
-                best, lowest, winner = found, value, heat
-        return self._design(space, best)
+        criterion, generator = criterion_named(self.criterion), np.random.default_rng(rng)
+        return self._design(space, search(given, self.levels, extra, criterion, self.budget, generator))
 
     def _ranks(self, design: Design) -> NDArray[np.int64]:
         """Levels 0 … levels − 1 of a given design."""
@@ -147,23 +139,5 @@ class Uniform:
             )
         return ranks
 
-    def _centred(self, ranks: NDArray[np.int64]) -> NDArray[np.float64]:
-        return (ranks + 0.5) / self.levels - 0.5
-
-    def _design(self, space: FactorSpace, centred: NDArray[np.float64]) -> Design:
-        ranks = np.rint((centred + 0.5) * self.levels - 0.5)
+    def _design(self, space: FactorSpace, ranks: NDArray[np.int64]) -> Design:
         return Design(space, -1.0 + 2.0 * ranks / (self.levels - 1), self.method)
-
-
-def fewest_first(column: NDArray[np.int64], levels: int, extra: int, rng: np.random.Generator) -> NDArray[np.int64]:
-    """`extra` levels in random order that make the counts of `column` and them together as equal as can be.
-
-    Ties are broken at random, so that a remainder does not favour the same levels in every column.
-    """
-    counts = np.bincount(column, minlength=levels)
-    added = []
-    for _ in range(extra):
-        fewest = np.flatnonzero(counts == counts.min())
-        added.append(rng.choice(fewest))
-        counts[added[-1]] += 1
-    return rng.permutation(np.array(added, dtype=np.int64))

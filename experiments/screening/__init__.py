@@ -20,7 +20,7 @@
 from .adequacy import Adequacy, judge_adequacy
 from .aliasing import alias_matrix
 from .box_meyer import ContrastPosterior, box_meyer
-from .contrasts import Effects, contrast_columns, effects
+from .contrasts import Effects, contrast_columns, count_contrasts, effects
 from .critical import ReferenceDistribution, reference_distribution
 from .curvature import CentrePoints
 from .daniel import HalfNormalFit, half_normal_fit
@@ -51,6 +51,7 @@ __all__ = [
     "alias_matrix",
     "box_meyer",
     "contrast_columns",
+    "count_contrasts",
     "dong",
     "effect_error",
     "effects",

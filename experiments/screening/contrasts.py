@@ -124,6 +124,12 @@ def contrast_columns(design: Design) -> NDArray[np.float64]:
     return columns
 
 
+def count_contrasts(design: Design) -> int:
+    """How many contrasts the runs of `design` will give; raises as :func:`contrast_columns` does."""
+    columns = contrast_columns(design)
+    return columns.shape[1] + completing_columns(columns, design.space.names)[0].shape[1]
+
+
 def _check_orthogonal(columns: NDArray[np.float64], names: tuple[str, ...]) -> None:
     n = len(columns)
     with_mean = np.hstack([np.ones((n, 1)), columns])

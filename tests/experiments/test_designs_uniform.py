@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from experiments import Factor, FactorSpace
-from experiments.designs import Design, Uniform, level_discrepancy_squared, uniform
-from experiments.designs.uniform import fewest_first
+from experiments.designs import Design, Uniform, level_discrepancy_squared, search
+from experiments.designs.search import fewest_first, may_mirror, mirrored
 from tests.reference import published_discrepancies
 
 
@@ -31,13 +31,13 @@ def test_every_level_equally_often(n, levels, k):
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_default_comes_near_the_best_published(seed):
-    """U30(6^6): the public tables have 0.0277122 as the best, the thesis's Table 2.4 has 0.02794006."""
+    """U30(6^6): the public tables have 0.0277122 as the best, the thesis's Table 2.4 0.02794006; our aim is 0.0280."""
     design = Uniform().generate(space(6), rng=seed)
     assert design.coded.shape == (30, 6)
-    assert level_discrepancy_squared(design.coded) <= 0.0282
+    assert level_discrepancy_squared(design.coded) <= 0.0280
 
 
-@pytest.mark.parametrize("size", [(12, 3, 12), (27, 3, 3), (15, 4, 15)], ids=str)
+@pytest.mark.parametrize("size", [(12, 3, 12), (27, 3, 3), (15, 4, 15), (40, 15, 4), (16, 4, 16)], ids=str)
 def test_published_designs_are_matched_or_beaten(size):
     (best,) = (
         row["best_published_cd2_squared"]
@@ -45,7 +45,7 @@ def test_published_designs_are_matched_or_beaten(size):
         if (row["n_runs"], row["n_factors"], row["n_levels"]) == size
     )
     n, k, levels = size
-    design = Uniform(n, levels, 6_000_000).generate(space(k))
+    design = Uniform(n, levels).generate(space(k))
     assert level_discrepancy_squared(design.coded) <= best * (1.0 + 1e-9)
 
 
@@ -55,11 +55,33 @@ def test_a_budget_lowers_the_discrepancy():
     assert values[2] < 0.9 * values[0]
 
 
-def test_several_annealings_keep_the_best(monkeypatch):
-    """The first annealing of two is the one that half the budget would have made alone."""
-    alone = level_discrepancy_squared(Uniform(12, 4, 2000).generate(space(3)).coded)
-    monkeypatch.setattr(uniform, "legs", lambda budget, movable: [budget // 2] * 2)
-    assert level_discrepancy_squared(Uniform(12, 4, 4000).generate(space(3)).coded) <= alone
+def test_the_best_of_all_trials_counts(monkeypatch):
+    """Of all annealings that are made, trials and long ones, the lowest is what comes out."""
+    met = []
+    true = search.anneal
+
+    def watched(start, criterion, *rest, **heat):
+        found = true(start, criterion, *rest, **heat)
+        met.append(found.value(criterion))
+        return found
+
+    monkeypatch.setattr(search, "anneal", watched)
+    design = Uniform(12, 4, 2_000_000).generate(space(3))
+    assert len(met) > len(search.KINDS) + 1
+    assert level_discrepancy_squared(design.coded) == pytest.approx(min(met), rel=1e-12)
+
+
+@pytest.mark.parametrize(("n", "levels"), [(12, 4), (12, 3), (12, 12), (18, 6), (2, 2)])
+def test_mirrored_designs_are_balanced(n, levels):
+    assert may_mirror(levels, n)
+    half = mirrored(levels, n, 3, np.random.default_rng(0))
+    for column in np.vstack([half, levels - 1 - half]).T:
+        assert_array_equal(np.bincount(column), [n // levels] * levels)
+
+
+@pytest.mark.parametrize(("n", "levels"), [(9, 3), (15, 5), (15, 3), (3, 3)])
+def test_an_odd_number_of_middle_levels_cannot_be_mirrored(n, levels):
+    assert not may_mirror(levels, n)
 
 
 @pytest.mark.parametrize("criterion", ["centred", "mixture", "wraparound"])

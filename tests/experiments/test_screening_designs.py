@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from experiments import Runs, Status
 from experiments.designs import Design, LatinHypercube
-from experiments.screening import alias_matrix, contrast_columns, effects, screen
+from experiments.screening import alias_matrix, contrast_columns, count_contrasts, effects, screen
 from tests.reference import lenth_case
 
 from .screening_cases import answered, full_factorial, plackett_burman, space
@@ -157,3 +157,9 @@ def test_signs_of_columns_do_not_change_the_verdict():
     one, other = screen(answered(base, y)), screen(answered(turned, y))
     assert_array_equal(one.active, other.active)
     assert_allclose(one.effects.values, -other.effects.values)
+
+
+def test_contrasts_of_a_full_factorial_count_the_products():
+    """Two factors at two levels: two main effects and their product, just enough for Lenth's method."""
+    assert count_contrasts(full_factorial(2)) == 3
+    assert count_contrasts(plackett_burman(12, 2)) == 11

@@ -1,0 +1,24 @@
+"""Our search with a budget that takes a wanted time on this machine."""
+
+import time
+
+from experiments import Factor, FactorSpace
+from experiments.designs import Uniform, level_discrepancy_squared
+
+TRIAL = 3_000_000
+"""Exchanges of the trial that measures the speed, after one that compiles."""
+
+
+def space(s: int) -> FactorSpace:
+    return FactorSpace(tuple(Factor(f"x{i}", "1", -1.0, 1.0) for i in range(s)))
+
+
+def best_in(n: int, s: int, q: int, seconds: float, seed: int = 0) -> tuple[float, float, int]:
+    """CD₂² reached, processor seconds spent in the search, and the budget that was."""
+    Uniform(n, q, TRIAL // 10).generate(space(s), seed)
+    begin = time.process_time()
+    Uniform(n, q, TRIAL).generate(space(s), seed)
+    budget = int(TRIAL * 0.85 * seconds / (time.process_time() - begin))
+    begin = time.process_time()
+    design = Uniform(n, q, budget).generate(space(s), seed)
+    return level_discrepancy_squared(design.coded), time.process_time() - begin, budget
