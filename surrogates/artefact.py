@@ -133,17 +133,28 @@ def _certificate(given: Any) -> Certificate | None:
     if given is None:
         return None
     parts = dict(given)
-    verdict, witness, condition = Verdict(parts.pop("verdict")), _list(parts, "witness"), parts.pop("condition")
+    verdict, witness = Verdict(parts.pop("verdict")), _list(parts, "witness")
     del parts["witness"]
+    numbers = {"condition": parts.pop("condition")}
+    # Models written before curved ones could be certified lack these.
+    numbers |= {name: parts.pop(name, None) for name in ("contraction", "sub_box")}
+    steps = {name: parts.pop(name, None) for name in ("chord_iterations", "newton_iterations")}
     words = build("certificate", _CertificateWords, parts)
     return Certificate(
         words.claim,
         verdict,
         words.method,
-        None if condition is None else float(_numbers([condition], "condition")[0]),
-        tuple(float(v) for v in _numbers(witness, "witness")),
-        words.reason,
+        witness=tuple(float(v) for v in _numbers(witness, "witness")),
+        reason=words.reason,
+        **{name: None if value is None else float(_numbers([value], name)[0]) for name, value in numbers.items()},
+        **{name: None if value is None else _whole(value, name) for name, value in steps.items()},
     )
+
+
+def _whole(value: Any, what: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+        raise ValueError(f"{what} must be a whole number of 0 or more, got {value!r}")
+    return value
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,28 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .inversion import obstacle
+from .convergence import TOLERANCE, Convergence, convergence
+from .derivatives import exponents_of, jacobian_tensor
+from .enclosures import Floats
+from .injectivity import Proof, prove
+from .refutation import refute
 
 if TYPE_CHECKING:
     from .model import Surrogate
 
 MARGIN = 1e-10
 """Smallest ratio of singular values that is called full rank: far above rounding, far below use."""
+
+MOST_COEFFICIENTS = 10_000_000
+"""Entries of the tensor of derivatives for which a proof is tried."""
+
+FINEST = 2.0**-7
+"""To this fraction of the box the largest certified sub-box is sought."""
+
+FEW_PARTS = 100
+"""Parts that the proof on one sub-box may take."""
+
+CLAIM = "no two settings in the domain have the same responses (the model is injective there)"
 
 
 class Verdict(StrEnum):
@@ -35,11 +50,20 @@ class Certificate:
     method : str
         How it was checked.
     condition : float or None
-        Condition number of the map from coded factors to scaled responses, if it is constant.
+        Condition number of the map from coded factors to scaled responses: in the Euclidean norm where the
+        map is affine; else a bound in the maximum norm, on the whole domain, if a contraction was proven.
     witness : tuple of float
-        For ``refuted``: a direction in coded factors along which no response changes.
+        For ``refuted``, of an affine model: a direction in coded factors along which no response changes. Of any
+        other: the coded points that show it, one after the other.
     reason : str
         One sentence for a reader.
+    contraction : float or None
+        Rate of a contraction that is the same as inverting: every chord step brings the settings nearer by it.
+    chord_iterations, newton_iterations : int or None
+        Steps that suffice for every reachable target, from the centre of the domain and each step clipped to the
+        domain, until every coded setting is within 1e-9 of the exact one.
+    sub_box : float or None
+        Where the claim is not certified: it is on the centred box of this fraction of the ranges.
     """
 
     claim: str
@@ -48,46 +72,55 @@ class Certificate:
     condition: float | None
     witness: tuple[float, ...]
     reason: str
+    contraction: float | None = None
+    chord_iterations: int | None = None
+    newton_iterations: int | None = None
+    sub_box: float | None = None
 
 
 def certify(model: "Surrogate") -> Certificate:
     """Whether no two settings in the domain have the same responses.
 
-    For an affine model this is a question of rank and is decided. For any other model this version
-    decides nothing and says so: sampling would not be a proof.
+    For an affine model this is a question of rank. For any other it is proven by subdivision with bounds on
+    every rounding error (:mod:`.injectivity`), or refuted by a witness that was checked in exact arithmetic
+    (:mod:`.refutation`), or left undecided. Sampling proves nothing and decides nothing.
     """
-    claim = "no two settings in the domain have the same responses (the model is injective there)"
-    if not model.is_affine:
-        against = obstacle(model)
-        how = (
-            f"it has no inverse: {against}"
-            if against
-            else ("its inverse is iterative and every answer is checked against the model")
+    if model.is_affine:
+        return _certify_affine(model)
+    if len(model.responses) < len(model.factors):
+        slope = model.jacobian_coded(np.zeros((1, len(model.factors))))[0] / model.scale[:, None]
+        return _refuted(
+            "invariance of domain",
+            np.linalg.svd(slope)[2][-1:],
+            "there are fewer responses than factors, so that many settings give one response; along the witness "
+            "direction none changes at the centre",
         )
-        return Certificate(
-            claim,
-            Verdict.UNDECIDED,
-            "none",
-            None,
-            (),
-            f"the model has terms above degree one, for which injectivity is not proven here; {how}",
-        )
+    if found := refute(model):
+        part = _largest_sub_box(model)
+        return _refuted("exact rational arithmetic", found.points, found.reason + _within(part), part)
+    if _size(model) > MOST_COEFFICIENTS:
+        return _undecided("the model has too many factors and powers for the proof to be tried", None)
+    left, proof = _proof(model)
+    if proof is None:
+        part = _largest_sub_box(model)
+        return _undecided(f"neither a proof nor a witness against it was found{_within(part)}", part)
+    return _certified(proof, convergence(model, left, proof))
+
+
+def _certify_affine(model: "Surrogate") -> Certificate:
     scaled = model.jacobian_coded(np.zeros((1, len(model.factors))))[0] / model.scale[:, None]
     _, singular, directions = np.linalg.svd(scaled)
     method = "singular values of the constant Jacobian"
     if len(singular) < scaled.shape[1] or singular[-1] <= MARGIN * singular[0]:
-        return Certificate(
-            claim,
-            Verdict.REFUTED,
+        return _refuted(
             method,
-            None,
-            tuple(float(v) for v in directions[-1]),
+            directions[-1:],
             "responses do not change along the witness direction, so many settings give one response; "
             "the inverse returns one of them",
         )
     condition = float(singular[0] / singular[-1])
     return Certificate(
-        claim,
+        CLAIM,
         Verdict.CERTIFIED,
         method,
         condition,
@@ -95,3 +128,73 @@ def certify(model: "Surrogate") -> Certificate:
         f"the model is affine with full column rank (condition number {condition:.3g}): "
         "its inverse is one matrix product",
     )
+
+
+def _certified(proof: Proof, found: Convergence | None) -> Certificate:
+    parts = "the whole box" if proof.parts == 1 else f"{proof.parts} parts of the box"
+    reason = f"the derivative, made near the identity by a constant matrix, was enclosed on {parts} and is "
+    if found is None:
+        kind = "positive definite" if proof.method == "positive definite" else "a P-matrix"
+        return Certificate(
+            CLAIM, Verdict.CERTIFIED, f"Bernstein enclosure, {proof.method}", None, (), f"{reason}{kind} everywhere"
+        )
+    steps = f"{found.chord} chord steps"
+    if found.newton is not None:
+        steps = f"{found.newton} Newton steps, or {steps},"
+    return Certificate(
+        CLAIM,
+        Verdict.CERTIFIED,
+        f"Bernstein enclosure, {proof.method}",
+        found.condition,
+        (),
+        f"{reason}within {proof.rate:.3g} of it everywhere; from the centre, {steps} give every reachable target to "
+        f"{TOLERANCE:g} of the half-ranges"
+        + ("" if found.condition is None else f", and the condition number is at most {found.condition:.3g}"),
+        proof.rate,
+        found.chord,
+        found.newton,
+    )
+
+
+def _refuted(method: str, points: Floats, reason: str, part: float | None = None) -> Certificate:
+    witness = tuple(float(v) for v in np.ravel(points))
+    return Certificate(CLAIM, Verdict.REFUTED, method, None, witness, reason, sub_box=part)
+
+
+def _undecided(reason: str, part: float | None) -> Certificate:
+    return Certificate(CLAIM, Verdict.UNDECIDED, "Bernstein enclosure", None, (), reason, sub_box=part)
+
+
+def _within(part: float | None) -> str:
+    return "" if part is None else f"; on the centred box of {part:.3g} of the ranges the claim is proven"
+
+
+def _size(model: "Surrogate") -> float:
+    degrees = exponents_of(model).max(axis=0, initial=0) + 1.0
+    return float(np.prod(degrees)) * len(model.factors) ** 2
+
+
+def _proof(model: "Surrogate", reach: float = 1.0, **limit: int) -> tuple[Floats, Proof | None]:
+    """A proof with the inverse of the centre's Jacobian as constant matrix, or that of the mean Jacobian."""
+    left = np.zeros((len(model.factors), len(model.responses)))
+    corners = np.random.default_rng(0).uniform(-reach, reach, (64, len(model.factors)))
+    for points in (np.zeros((1, len(model.factors))), np.vstack([corners, -corners])):
+        slope = model.jacobian_coded(points).mean(axis=0) / model.scale[:, None]
+        left = np.linalg.pinv(slope) / model.scale
+        if np.isfinite(left).all() and (proof := prove(jacobian_tensor(model, left), reach, **limit)):
+            return left, proof
+    return left, None
+
+
+def _largest_sub_box(model: "Surrogate") -> float | None:
+    """Fraction of the ranges of the largest centred box, to a grid, on which the claim can be proven."""
+    if _size(model) > MOST_COEFFICIENTS:
+        return None
+    low, high = 0.0, 1.0
+    while high - low > FINEST:
+        middle = 0.5 * (low + high)
+        if _proof(model, middle, most_parts=FEW_PARTS)[1]:
+            low = middle
+        else:
+            high = middle
+    return low or None
