@@ -1,6 +1,6 @@
 """What may be claimed of a model's inverse, and why."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
@@ -10,6 +10,7 @@ from .convergence import TOLERANCE, Convergence, convergence
 from .derivatives import exponents_of, jacobian_tensor
 from .enclosures import Floats
 from .injectivity import Proof, prove
+from .inversion import obstacle
 from .refutation import refute
 
 if TYPE_CHECKING:
@@ -87,6 +88,21 @@ def certify(model: "Surrogate") -> Certificate:
     """
     if model.is_affine:
         return _certify_affine(model)
+    found = _certify_curved(model)
+    if found.verdict is not Verdict.CERTIFIED and (against := obstacle(model)):
+        return replace(found, reason=f"{found.reason}; it has no inverse: {against}")
+    return found
+
+
+def _certify_curved(model: "Surrogate") -> Certificate:
+    acting = exponents_of(model).max(axis=0, initial=0) > 0
+    if not acting.all():
+        inert = [name for name, acts in zip(model.factors.names, acting, strict=True) if not acts]
+        return _refuted(
+            "terms of the model",
+            np.eye(len(acting))[~acting][:1],
+            f"no response depends on {' or '.join(inert)}, so that many settings give one response",
+        )
     if len(model.responses) < len(model.factors):
         slope = model.jacobian_coded(np.zeros((1, len(model.factors))))[0] / model.scale[:, None]
         return _refuted(

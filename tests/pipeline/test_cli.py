@@ -232,7 +232,7 @@ class TestExitCodes:
     def test_4_when_the_inverse_is_not_certified(self, smoke_copy, tmp_path, no_report, capsys):
         argv = ["run", SMOKE, "--out", str(tmp_path / "out"), *SET_SMALL, "--set", "require.certified_inverse=true"]
         assert main(argv) == 4
-        assert "the inverse is not certified (verdict: undecided)" in capsys.readouterr().err
+        assert "the inverse is not certified (verdict: refuted)" in capsys.readouterr().err
 
     def test_3_when_a_screening_run_fails(self, counted, tmp_path, capsys):
         def trouble(point):

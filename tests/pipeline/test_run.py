@@ -463,7 +463,7 @@ class TestEdges:
 
     def test_what_is_not_inverted_is_not_certified(self, study):
         outcome = study(oracle="crowded", overrides=["require.certified_inverse=true"])
-        assert outcome.shortfalls == (f"the inverse is not certified (verdict: undecided; {outcome.obstacle})",)
+        assert outcome.shortfalls == (f"the inverse is not certified (verdict: refuted; {outcome.obstacle})",)
 
     def test_more_affine_responses_than_factors_are_inverted(self, study):
         """On a line through the oracle's own answers the closed form is exact."""
