@@ -3,7 +3,7 @@
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -92,6 +92,13 @@ class FitTable(Table):
     degree: int = Field(default=2, ge=1, le=5, description="highest total degree of the candidate terms")
     interactions: bool = Field(default=True, description="whether products of different factors are candidates")
     trim: bool = Field(default=True, description="whether terms that the data do not support are removed")
+    selection: Literal["backward", "forward"] = Field(
+        default="backward",
+        description="backward: from a fit of all candidates; forward: term by term, fewer runs than candidates will do",
+    )
+    heredity: Literal["none", "weak", "strong"] = Field(
+        default="none", description="for forward selection: whether a product needs its parts in the model"
+    )
     runs_per_term: float = Field(
         default=1.5, ge=1.0, le=100.0, description="runs per candidate term, where n_runs is not given"
     )

@@ -78,15 +78,17 @@ def fitted(study: Study, kept: tuple[str, ...], runs: Runs) -> Surrogate:
     done = runs.completed()
     inner = study.space.select(kept)
     columns = [study.space.index(name) for name in kept]
-    needed = len(study.candidates(len(kept)))
+    needed = study.fewest_runs(len(kept))
     if len(done) < needed:
-        raise TooManyFailures(f"{len(done)} runs are left for {needed} candidate terms: {runs.failures()}")
+        raise TooManyFailures(f"{len(done)} runs are left of the {needed} that the fit needs: {runs.failures()}")
     fit = study.config.fit
     # Taken from the package when it is needed: the estimator brings scikit-learn.
     regressor = surrogates.PolynomialRegressor(
         degree=fit.degree,
         interactions=fit.interactions,
         trim=fit.trim,
+        selection=fit.selection,
+        heredity=fit.heredity,
         resolution=study.oracle.resolution,
         space=inner,
         responses=study.oracle.responses,

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from math import ceil
 from typing import Any, TypeVar
 
 import numpy as np
@@ -14,6 +15,7 @@ from experiments.oracles import Oracle
 from experiments.screening import count_contrasts
 from experiments.terms import Terms
 from surrogates import Surrogate, exports
+from surrogates.stepwise import FULLEST, check_selection
 
 from .config import Config
 from .errors import InputError
@@ -64,6 +66,15 @@ class Study:
         names = [f"x{i}" for i in range(n_factors)]
         return Terms.polynomial(names, self.config.fit.degree, self.config.fit.interactions)
 
+    def fewest_runs(self, n_factors: int) -> int:
+        """Runs below which no polynomial of the config can be fitted in that many factors.
+
+        As many as candidates; for forward selection as many as let all linear terms enter.
+        """
+        if self.config.fit.trim and self.config.fit.selection == "forward":
+            return ceil((n_factors + 1) / FULLEST)
+        return len(self.candidates(n_factors))
+
     def seed(self, stage: str) -> np.random.SeedSequence:
         """The seed of one stage; streams are independent, so changing one stage leaves the others alone."""
         return _seed(self.config, stage)
@@ -96,6 +107,7 @@ def resolve(config: Config) -> Study:
         _checked("screening.keep", lambda name=name: space.index(name))
     study = Study(config, oracle, space, design, config.export.prefix or config.name)
     _checked("screening.follow", lambda: study.folded_screening)
+    _checked("fit", lambda: check_selection(config.fit.selection, config.fit.heredity))
     _check_fill(study)
     _check_exports(study)
     return study
@@ -126,7 +138,12 @@ def _check_fill(study: Study) -> None:
 
 def check_runs(study: Study, n_factors: int, n_runs: int) -> None:
     """Refuse a filling design with fewer runs than candidate terms."""
-    needed = len(study.candidates(n_factors))
+    needed = study.fewest_runs(n_factors)
+    if n_runs < needed and study.config.fit.selection == "forward":
+        raise InputError(
+            f"fit.design: {n_runs} runs are too few for a forward selection in {n_factors} factors; use n_runs = "
+            f"{needed} or more"
+        )
     if n_runs < needed:
         raise InputError(
             f"fit.design: {n_runs} runs are fewer than the {needed} terms of a degree-{study.config.fit.degree} "

@@ -15,6 +15,7 @@ from experiments.terms import Terms, model_matrix
 
 from .model import Surrogate
 from .selection import PENALTIES, Fit, penalised_fit, trimmed_fit
+from .stepwise import check_selection, forward_fit
 
 
 class PolynomialRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
@@ -33,6 +34,11 @@ class PolynomialRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         Relative ridge penalty; chosen by leave-one-out if None.
     trim : bool
         Whether terms that the data do not support are removed.
+    selection : str
+        ``"backward"``: the weakest term leaves next, from a fit of all candidates. ``"forward"``: the term
+        that helps most enters next, also where there are more candidates than runs; no penalty.
+    heredity : str
+        For forward selection: ``"none"``, ``"weak"`` or ``"strong"``, see :func:`.forward_fit`.
     resolution : float
         Leave-one-out errors below this fraction of a response's largest value count as none.
     space : FactorSpace, optional
@@ -59,6 +65,8 @@ class PolynomialRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         interactions: bool = True,
         penalty: float | None = None,
         trim: bool = True,
+        selection: str = "backward",
+        heredity: str = "none",
         resolution: float = 1e-12,
         space: FactorSpace | None = None,
         responses: Sequence[Response] | None = None,
@@ -67,6 +75,8 @@ class PolynomialRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         self.interactions = interactions
         self.penalty = penalty
         self.trim = trim
+        self.selection = selection
+        self.heredity = heredity
         self.resolution = resolution
         self.space = space
         self.responses = responses
@@ -89,7 +99,8 @@ class PolynomialRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         responses = _responses_for(table.shape[1], self.responses)
         candidates = Terms.polynomial(space.names, self.degree, self.interactions)
         matrix = model_matrix(candidates, space.code(X))
-        fits = [self._fit_one(matrix, column) for column in table.T]
+        exponents = np.array(candidates.exponents, dtype=np.int64).reshape(len(candidates), -1)
+        fits = [self._fit_one(matrix, exponents, column) for column in table.T]
 
         used = np.unique(np.concatenate([fit.columns for fit in fits])).astype(np.int64)
         coefficients = np.zeros((len(candidates), len(fits)))
@@ -110,10 +121,12 @@ class PolynomialRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         predicted = self.surrogate_.predict(X)
         return predicted[:, 0] if self._one_response else predicted
 
-    def _fit_one(self, matrix: NDArray[np.float64], y: NDArray[np.float64]) -> Fit:
+    def _fit_one(self, matrix: NDArray[np.float64], exponents: NDArray[np.int64], y: NDArray[np.float64]) -> Fit:
         # An all-zero response has no scale of its own; any positive floor then keeps no term.
         floor = self.resolution * float(np.abs(y).max()) or np.finfo(float).tiny
         penalties = PENALTIES if self.penalty is None else (float(self.penalty),)
+        if self.trim and self.selection == "forward":
+            return forward_fit(matrix, y, exponents, self.heredity, floor)
         if self.trim:
             return trimmed_fit(matrix, y, penalties, floor)
         return penalised_fit(matrix, y, np.arange(matrix.shape[1]), penalties, floor)
@@ -121,6 +134,9 @@ class PolynomialRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
     def _check_settings(self) -> None:
         if isinstance(self.degree, bool) or not isinstance(self.degree, (int, np.integer)) or self.degree < 1:
             raise ValueError(f"degree must be a whole number of at least 1, got {self.degree!r}")
+        check_selection(self.selection, self.heredity)
+        if self.selection == "forward" and self.penalty:
+            raise ValueError(f"selection 'forward' takes no penalty, got {self.penalty!r}; leave it out")
         if self.penalty is not None and not _is_number_from_zero(self.penalty):
             raise ValueError(f"penalty must be None, 0 or a positive number, got {self.penalty!r}")
         if not _is_number_from_zero(self.resolution):

@@ -151,19 +151,35 @@ def backward_path(
 
 def _supported_step(matrix: NDArray[np.float64], y: NDArray[np.float64], floor: float, path: list[Fit]) -> int:
     """How many terms to remove, by cross-validation of the whole path."""
-    n_folds = min(len(y), FOLDS)
-    # Dealt in one fixed shuffled order: runs in standard order have patterns that a plain count would follow.
-    fold = np.random.default_rng(0).permutation(len(y)) % n_folds
     penalties = [fit.penalty for fit in path]
     errors = np.zeros((len(y), len(path)))
-    for k in range(n_folds):
-        out = fold == k
+    for out in folds(len(y)):
         predicted = _path_predictions(matrix[~out], y[~out], matrix[out], penalties, constant_column(matrix))
         errors[out] = y[out, None] - predicted
+    return int(np.flatnonzero(supported(errors, floor))[-1])
+
+
+def folds(n_runs: int) -> list[NDArray[np.bool_]]:
+    """Which runs are left out, one mask per fold.
+
+    Dealt in one fixed shuffled order: runs in standard order have patterns that a plain count would follow.
+    """
+    n_folds = min(n_runs, FOLDS)
+    fold = np.random.default_rng(0).permutation(n_runs) % n_folds
+    return [fold == k for k in range(n_folds)]
+
+
+def supported(errors: NDArray[np.float64], floor: float) -> NDArray[np.bool_]:
+    """Which models predict within one standard error of the best, or to `floor`.
+
+    Parameters
+    ----------
+    errors : ndarray, shape (n_runs, n_models)
+        Of each run, predicted without it.
+    """
     squares = np.mean(errors**2, axis=0)
     best = int(np.argmin(squares))
-    allowed = max(squares[best] + _standard_error(errors[:, best]), floor**2)
-    return int(np.flatnonzero(squares <= allowed)[-1])
+    return squares <= max(squares[best] + _standard_error(errors[:, best]), floor**2)
 
 
 def _path_predictions(

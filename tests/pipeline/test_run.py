@@ -378,7 +378,7 @@ class TestFailures:
                 raise ArithmeticError("the solver gave up")
 
         Counted.trouble = staticmethod(trouble)
-        with pytest.raises(TooManyFailures, match=r"8 runs are left for 10 candidate terms: 8 of 16 runs failed"):
+        with pytest.raises(TooManyFailures, match=r"8 runs are left of the 10 that the fit needs: 8 of 16 runs failed"):
             study(overrides=["oracle.max_failed_fraction=0.9", "fit.design.n_runs=16", "fit.design.levels=4"])
 
     def test_in_validation_and_inversion_are_left_out_of_the_errors(self, study):
