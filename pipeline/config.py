@@ -99,6 +99,9 @@ class FitTable(Table):
     heredity: Literal["none", "weak", "strong"] = Field(
         default="none", description="for forward selection: whether a product needs its parts in the model"
     )
+    gradients: bool = Field(
+        default=False, description="whether the oracle's Jacobian at each run teaches, too (forward selection only)"
+    )
     runs_per_term: float = Field(
         default=1.5, ge=1.0, le=100.0, description="runs per candidate term, where n_runs is not given"
     )

@@ -92,9 +92,17 @@ def fitted(study: Study, kept: tuple[str, ...], runs: Runs) -> Surrogate:
         resolution=study.oracle.resolution,
         space=inner,
         responses=study.oracle.responses,
-    ).fit(done.design.physical[:, columns], done.values)
+    ).fit(done.design.physical[:, columns], done.values, _slopes(study, done, columns))
     surrogate = regressor.surrogate_.embed(study.space)
     return replace(surrogate, certificate=certify(surrogate), provenance=provenance(study, kept))
+
+
+def _slopes(study: Study, runs: Runs, columns: list[int]) -> Any:
+    """The oracle's Jacobian by the kept factors at each run, if the config wants it taught."""
+    if not study.config.fit.gradients:
+        return None
+    oracle: Any = study.oracle  # `resolve` has seen to it that this one gives Jacobians
+    return oracle.jacobian(runs.design.physical)[:, :, columns]
 
 
 def validated(study: Study, surrogate: Surrogate, runs: Runs) -> Surrogate:

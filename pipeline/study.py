@@ -108,6 +108,7 @@ def resolve(config: Config) -> Study:
     study = Study(config, oracle, space, design, config.export.prefix or config.name)
     _checked("screening.follow", lambda: study.folded_screening)
     _checked("fit", lambda: check_selection(config.fit.selection, config.fit.heredity))
+    _check_gradients(study)
     _check_fill(study)
     _check_exports(study)
     return study
@@ -134,6 +135,17 @@ def _check_fill(study: Study) -> None:
         check_levels(study.config, levels)
     if method.n_runs is not None:
         check_runs(study, n_factors, method.n_runs)
+
+
+def _check_gradients(study: Study) -> None:
+    """Refuse gradients that the oracle does not give or the selection does not take."""
+    fit = study.config.fit
+    if not fit.gradients:
+        return
+    if fit.selection != "forward" or not fit.trim:
+        raise InputError("fit.gradients needs fit.selection = 'forward' and fit.trim = true")
+    if not hasattr(study.oracle, "jacobian"):
+        raise InputError(f"fit.gradients: the oracle {study.oracle.name!r} gives no Jacobian; leave it false")
 
 
 def check_runs(study: Study, n_factors: int, n_runs: int) -> None:

@@ -11,8 +11,9 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 
 from experiments.factors import Factor, FactorSpace
 from experiments.runs import Response
-from experiments.terms import Terms, model_matrix
+from experiments.terms import Terms, model_matrix, model_matrix_gradient
 
+from .gradient_fit import gradient_fit
 from .model import Surrogate
 from .selection import PENALTIES, Fit, penalised_fit, trimmed_fit
 from .stepwise import check_selection, forward_fit
@@ -81,13 +82,20 @@ class PolynomialRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         self.space = space
         self.responses = responses
 
-    def fit(self, X: ArrayLike, y: ArrayLike) -> "PolynomialRegressor":
+    def fit(self, X: ArrayLike, y: ArrayLike, jacobian: ArrayLike | None = None) -> "PolynomialRegressor":
         """Fit to settings `X` (n_runs, n_factors) and responses `y` (n_runs,) or (n_runs, n_responses).
+
+        Parameters
+        ----------
+        X, y : array_like
+        jacobian : array_like, shape (n_runs, n_responses, n_factors), optional
+            d response / d factor at each run, in the units of `y` and `X`: taught along with the values, see
+            :func:`.gradient_fit`. Needs ``selection="forward"``.
 
         Raises
         ------
         ValueError
-            If a setting is out of range, or `X`, `y`, `space` and `responses` do not fit together.
+            If a setting is out of range, or `X`, `y`, `jacobian`, `space` and `responses` do not fit together.
         """
         checked: Any = validate_data(
             self, X, y, multi_output=True, y_numeric=True, dtype=np.float64, ensure_min_samples=2
@@ -100,7 +108,16 @@ class PolynomialRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         candidates = Terms.polynomial(space.names, self.degree, self.interactions)
         matrix = model_matrix(candidates, space.code(X))
         exponents = np.array(candidates.exponents, dtype=np.int64).reshape(len(candidates), -1)
-        fits = [self._fit_one(matrix, exponents, column) for column in table.T]
+        slopes = self._slopes(jacobian, (*table.shape, len(space)))
+        if slopes is None:
+            fits = [self._fit_one(matrix, exponents, column) for column in table.T]
+        else:
+            gradient = model_matrix_gradient(candidates, space.code(X))
+            coded = slopes * space.half_range
+            fits = [
+                gradient_fit(matrix, column, gradient, coded[:, j], exponents, self.heredity, self._floor(column))
+                for j, column in enumerate(table.T)
+            ]
 
         used = np.unique(np.concatenate([fit.columns for fit in fits])).astype(np.int64)
         coefficients = np.zeros((len(candidates), len(fits)))
@@ -122,14 +139,29 @@ class PolynomialRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         return predicted[:, 0] if self._one_response else predicted
 
     def _fit_one(self, matrix: NDArray[np.float64], exponents: NDArray[np.int64], y: NDArray[np.float64]) -> Fit:
-        # An all-zero response has no scale of its own; any positive floor then keeps no term.
-        floor = self.resolution * float(np.abs(y).max()) or np.finfo(float).tiny
+        floor = self._floor(y)
         penalties = PENALTIES if self.penalty is None else (float(self.penalty),)
         if self.trim and self.selection == "forward":
             return forward_fit(matrix, y, exponents, self.heredity, floor)
         if self.trim:
             return trimmed_fit(matrix, y, penalties, floor)
         return penalised_fit(matrix, y, np.arange(matrix.shape[1]), penalties, floor)
+
+    def _floor(self, y: NDArray[np.float64]) -> float:
+        """Error that counts as none; an all-zero response has no scale, and any positive floor then keeps no term."""
+        return self.resolution * float(np.abs(y).max()) or np.finfo(float).tiny
+
+    def _slopes(self, jacobian: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[np.float64] | None:
+        if jacobian is None:
+            return None
+        if self.selection != "forward" or not self.trim:
+            raise ValueError("a Jacobian is taught by forward selection only: set selection='forward' and trim=True")
+        slopes = np.asarray(jacobian, dtype=np.float64)
+        if slopes.shape != shape or not np.isfinite(slopes).all():
+            raise ValueError(
+                f"jacobian must be finite and of shape {shape} (runs, responses, factors); got {slopes.shape}"
+            )
+        return slopes
 
     def _check_settings(self) -> None:
         if isinstance(self.degree, bool) or not isinstance(self.degree, (int, np.integer)) or self.degree < 1:

@@ -49,44 +49,72 @@ def forward_fit(
     (Hastie, Tibshirani and Friedman, 2009, The Elements of Statistical Learning, 2nd ed., section 7.10.2).
     """
     parents = parents_of(exponents)
-    order = entry_order(matrix, y, parents, heredity)
-    start = 1 if constant_column(matrix) >= 0 else 0
+    constant = constant_column(matrix)
+    start = 1 if constant >= 0 else 0
+    order, _ = forward_path(matrix, y, matrix[:0], parents, heredity, constant)
     path = [penalised_fit(matrix, y, np.sort(order[:k]), (0.0,), floor) for k in range(start, len(order) + 1)]
     explained = [fit for fit in path if fit.loo_rmse <= floor]
     if explained:
         return explained[0]
-    errors = np.full((len(y), len(path)), np.nan)
+    errors = np.zeros((len(y), len(path)))
     for out in folds(len(y)):
-        met = entry_order(matrix[~out], y[~out], parents, heredity)
-        for step in range(len(path)):
-            # A shorter path of the fold ends early; its last model stands for the longer ones.
-            used = met[: start + step]
-            slope = np.linalg.lstsq(matrix[~out][:, used], y[~out], rcond=None)[0] if used else np.zeros(0)
-            errors[out, step] = y[out] - matrix[out][:, used] @ slope
-    allowed = supported(errors, floor)
-    return path[int(np.flatnonzero(allowed)[0])]
+        _, predicted = forward_path(matrix[~out], y[~out], matrix[out], parents, heredity, constant)
+        errors[out] = y[out, None] - as_long(predicted[:, start:], len(path))
+    return path[int(np.flatnonzero(supported(errors, floor))[0])]
 
 
-def entry_order(
-    matrix: NDArray[np.float64], y: NDArray[np.float64], parents: list[list[int]], heredity: str
-) -> list[int]:
-    """Columns in the order in which they enter, the constant first if there is one."""
-    n, p = matrix.shape
-    rest, residual, order = matrix.copy(), y.astype(np.float64), []
+def as_long(predicted: NDArray[np.float64], steps: int) -> NDArray[np.float64]:
+    """Predictions of a path, the last model standing for those that a shorter path does not have."""
+    return predicted[:, np.minimum(np.arange(steps), predicted.shape[1] - 1)]
+
+
+def forward_path(
+    matrix: NDArray[np.float64],
+    y: NDArray[np.float64],
+    asked: NDArray[np.float64],
+    parents: list[list[int]],
+    heredity: str,
+    constant: int,
+) -> tuple[list[int], NDArray[np.float64]]:
+    """Columns in the order in which they enter, and what each model on the way predicts at the rows `asked`.
+
+    Columns are made orthogonal as they enter (modified Gram–Schmidt), rows asked being transformed alike.
+
+    Parameters
+    ----------
+    matrix, y, asked : ndarray, shape (n_rows, n_terms), (n_rows,) and (n_asked, n_terms)
+    parents, heredity
+        See :func:`parents_of`.
+    constant : int
+        The column that enters first; −1 for none.
+
+    Returns
+    -------
+    list of int, length n_steps
+    ndarray, shape (n_asked, n_steps + 1)
+    """
+    rest, there, residual = matrix.copy(), asked.copy(), y.astype(np.float64)
     sizes = (matrix**2).sum(axis=0)
-    entering = constant_column(matrix)
+    order: list[int] = []
+    predictions: list[NDArray[np.float64]] = [np.zeros(len(asked))]
+    entering = constant
     while True:
         if entering < 0:
             left = (rest**2).sum(axis=0)
-            may = (left > INDEPENDENT * sizes) & _eligible(order, parents, heredity, p)
+            may = (left > INDEPENDENT * sizes) & _eligible(order, parents, heredity, len(sizes))
             may[order] = False
-            if len(order) >= max(1, int(FULLEST * n)) or not may.any() or not residual.any():
-                return order
+            if len(order) >= max(1, int(FULLEST * len(y))) or not may.any() or not residual.any():
+                return order, np.column_stack(predictions)
             gain = np.where(may, (rest.T @ residual) ** 2 / np.where(left > 0.0, left, 1.0), -1.0)
             entering = int(np.argmax(gain))
-        direction = rest[:, entering] / np.linalg.norm(rest[:, entering])
-        rest = rest - np.outer(direction, direction @ rest)
-        residual = residual - direction * (direction @ residual)
+        length = float(np.linalg.norm(rest[:, entering]))
+        direction: NDArray[np.float64] = rest[:, entering] / length
+        shadow: NDArray[np.float64] = there[:, entering] / length
+        along, share = direction @ rest, float(direction @ residual)
+        rest = rest - np.outer(direction, along)
+        there = there - np.outer(shadow, along)
+        residual = residual - direction * share
+        predictions.append(np.asarray(predictions[-1] + shadow * share, dtype=np.float64))
         order.append(entering)
         entering = -1
 

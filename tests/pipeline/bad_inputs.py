@@ -67,6 +67,18 @@ BAD = [
     appended("true for a range", "[factors.load]\nlow = true\nhigh = 2.0", r"load\.low should be a number, got True"),
     appended("text for a range", '[factors.load]\nlow = "1"\nhigh = 2.0', r"load\.low should be a number, got '1'"),
     appended("true for alpha", "[screening]\nalpha = true", r"screening\.alpha should be a number, got True"),
+    appended(
+        "heredity of a backward selection",
+        '[fit]\nheredity = "weak"',
+        r"fit: heredity 'weak' needs selection 'forward'",
+    ),
+    appended("no such selection", '[fit]\nselection = "sideways"', r"fit\.selection"),
+    appended("gradients of a backward selection", "[fit]\ngradients = true", r"needs fit\.selection = 'forward'"),
+    appended(
+        "too few runs to select from",
+        '[fit]\nselection = "forward"\n[fit.design]\nmethod = "random"\nn_runs = 8',
+        r"8 runs are too few for a forward selection in 4 factors; use n_runs = 9 or more",
+    ),
     appended("number for a switch", "[fit]\ntrim = 1", r"fit\.trim should be a boolean, got 1"),
     appended("text for a list", '[export]\ntargets = "c99"', r"export\.targets should be a list, got 'c99'"),
     appended("date for a number", "[fit]\ndegree = 2020-01-01", r"fit\.degree should be a whole number, got"),

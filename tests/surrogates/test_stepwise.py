@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from experiments import Factor, FactorSpace, Terms, model_matrix
 from surrogates import PolynomialRegressor
 from surrogates.selection import penalised_fit
-from surrogates.stepwise import FULLEST, entry_order, forward_fit, parents_of
+from surrogates.stepwise import FULLEST, forward_fit, forward_path, parents_of
 
 NAMES = tuple(f"f{i}" for i in range(6))
 CUBIC = Terms.polynomial(NAMES, 3)
@@ -16,6 +16,10 @@ EXPONENTS = np.array(CUBIC.exponents)
 
 def points(n: int, seed: int = 0) -> np.ndarray:
     return np.random.default_rng(seed).uniform(-1.0, 1.0, (n, 6))
+
+
+def entry_order(matrix, y, parents, heredity):
+    return forward_path(matrix, y, matrix[:0], parents, heredity, 0)[0]
 
 
 def truth(labels: dict[str, float], coded: np.ndarray) -> np.ndarray:
@@ -73,6 +77,16 @@ def test_each_step_enters_what_lowers_the_residual_most():
             used = [*order[:k], candidate]
             left.append(np.linalg.norm(y - matrix[:, used] @ np.linalg.lstsq(matrix[:, used], y, rcond=None)[0]))
         assert order[k] == int(np.argmin(left))
+
+
+def test_predictions_along_the_path_are_those_of_least_squares():
+    coded, asked = points(40), points(9, seed=1)
+    matrix, there = model_matrix(CUBIC, coded), model_matrix(CUBIC, asked)
+    y = np.exp(coded[:, 0]) + coded[:, 1] * coded[:, 2]
+    order, predicted = forward_path(matrix, y, there, parents_of(EXPONENTS), "none", 0)
+    for k in (1, 3, 10, len(order)):
+        slope = np.linalg.lstsq(matrix[:, order[:k]], y, rcond=None)[0]
+        assert_allclose(predicted[:, k], there[:, order[:k]] @ slope, rtol=1e-8, atol=1e-8)
 
 
 @pytest.mark.parametrize(("heredity", "enough"), [("weak", any), ("strong", all)])
