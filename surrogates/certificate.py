@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .convergence import TOLERANCE, Convergence, convergence
-from .derivatives import exponents_of, jacobian_tensor
+from .derivatives import MOST_COEFFICIENTS, exponents_of, jacobian_tensor, tensor_size
 from .enclosures import Floats
 from .injectivity import Proof, prove
 from .inversion import obstacle
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
 MARGIN = 1e-10
 """Smallest ratio of singular values that is called full rank: far above rounding, far below use."""
 
-MOST_COEFFICIENTS = 10_000_000
-"""Entries of the tensor of derivatives for which a proof is tried."""
-
 FINEST = 2.0**-7
 """To this fraction of the box the largest certified sub-box is sought."""
 
 FEW_PARTS = 100
 """Parts that the proof on one sub-box may take."""
 
-CLAIM = "no two settings in the domain have the same responses (the model is injective there)"
+CLAIM = (
+    "no two settings in the domain have the same responses (the model is injective there), and the Jacobian is of full "
+    "rank everywhere in it"
+)
 
 
 class Verdict(StrEnum):
@@ -114,7 +114,7 @@ def _certify_curved(model: "Surrogate") -> Certificate:
     if found := refute(model):
         part = _largest_sub_box(model)
         return _refuted("exact rational arithmetic", found.points, found.reason + _within(part), part)
-    if _size(model) > MOST_COEFFICIENTS:
+    if tensor_size(model) > MOST_COEFFICIENTS:
         return _undecided("the model has too many factors and powers for the proof to be tried", None)
     left, proof = _proof(model)
     if proof is None:
@@ -185,11 +185,6 @@ def _within(part: float | None) -> str:
     return "" if part is None else f"; on the centred box of {part:.3g} of the ranges the claim is proven"
 
 
-def _size(model: "Surrogate") -> float:
-    degrees = exponents_of(model).max(axis=0, initial=0) + 1.0
-    return float(np.prod(degrees)) * len(model.factors) ** 2
-
-
 def _proof(model: "Surrogate", reach: float = 1.0, **limit: int) -> tuple[Floats, Proof | None]:
     """A proof with the inverse of the centre's Jacobian as constant matrix, or that of the mean Jacobian."""
     left = np.zeros((len(model.factors), len(model.responses)))
@@ -204,7 +199,7 @@ def _proof(model: "Surrogate", reach: float = 1.0, **limit: int) -> tuple[Floats
 
 def _largest_sub_box(model: "Surrogate") -> float | None:
     """Fraction of the ranges of the largest centred box, to a grid, on which the claim can be proven."""
-    if _size(model) > MOST_COEFFICIENTS:
+    if tensor_size(model) > MOST_COEFFICIENTS:
         return None
     low, high = 0.0, 1.0
     while high - low > FINEST:

@@ -11,10 +11,20 @@ if TYPE_CHECKING:
     from .model import Surrogate
 
 
+MOST_COEFFICIENTS = 10_000_000
+"""Entries of the tensor of derivatives for which a proof is tried."""
+
+
 def exponents_of(model: "Surrogate") -> NDArray[np.int64]:
     """Exponents of the terms that some response uses, shape (n_used, n_factors)."""
     table = np.array(model.terms.exponents, dtype=np.int64).reshape(len(model.terms), len(model.factors))
     return table[(model.coefficients != 0.0).any(axis=1)]
+
+
+def tensor_size(model: "Surrogate") -> float:
+    """Entries of :func:`jacobian_tensor`."""
+    degrees = exponents_of(model).max(axis=0, initial=0) + 1.0
+    return float(np.prod(degrees)) * len(model.factors) ** 2
 
 
 def mixed(model: "Surrogate", left: Floats) -> Ball:

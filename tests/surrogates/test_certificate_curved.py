@@ -1,6 +1,7 @@
 """Certificates of curved maps: maps on both sides of the line, and what a certificate promises, tried out."""
 
 from fractions import Fraction
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -102,11 +103,16 @@ def random_map(seed: int):
     return surrogate(unit_box(n), terms.labels, rows * 10.0 ** rng.uniform(-6, 3, (n, 1)))
 
 
-@pytest.mark.parametrize("seed", range(60))
+@lru_cache
+def certificate_of(seed: int):
+    return certify(random_map(seed))
+
+
+@pytest.mark.parametrize("seed", range(40))
 def test_what_is_certified_has_no_counterexample_and_keeps_its_promises(seed):
     """4000 points: no change of the determinant's sign, no two near images, and the promised steps suffice."""
     model = random_map(seed)
-    certificate = certify(model)
+    certificate = certificate_of(seed)
     rng = np.random.default_rng(seed)
     points = rng.uniform(-1.0, 1.0, (4000, len(model.factors)))
     signs = np.sign(np.linalg.det(model.jacobian_coded(points) / model.scale[:, None]))
@@ -135,7 +141,7 @@ def test_what_is_certified_has_no_counterexample_and_keeps_its_promises(seed):
 
 
 def test_all_verdicts_occur_among_the_random_maps():
-    assert {certify(random_map(seed)).verdict for seed in range(12)} >= {Verdict.CERTIFIED, Verdict.REFUTED}
+    assert {certificate_of(seed).verdict for seed in range(12)} >= {Verdict.CERTIFIED, Verdict.REFUTED}
 
 
 def test_the_witnesses_of_a_sign_change_have_determinants_of_opposite_signs():
