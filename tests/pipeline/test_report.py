@@ -270,6 +270,17 @@ class TestOtherStudies:
         page = page_of(outcome_of("all_still", 'screening.keep=["a"]'))
         assert "nan" not in page.text.lower().split()
 
+    @pytest.mark.parametrize(
+        ("setting", "words"),
+        [
+            ("fit.trim=true", "terms were removed until those left are what the data support"),
+            ("fit.trim=false", "all were kept"),
+            ('fit.selection="forward"', "terms entered one at a time"),
+        ],
+    )
+    def test_says_how_terms_were_chosen(self, setting, words, outcome_of):
+        assert words in page_of(outcome_of("counted", setting)).text
+
     def test_every_target_refused(self, outcome_of):
         page = page_of(outcome_of("unreachable", "fit.degree=1"))
         assert "0 of 20" in page.text
