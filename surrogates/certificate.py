@@ -22,7 +22,7 @@ MARGIN = 1e-10
 FINEST = 2.0**-7
 """To this fraction of the box the largest certified sub-box is sought."""
 
-FEW_PARTS = 100
+FEW_PARTS = 40
 """Parts that the proof on one sub-box may take."""
 
 CLAIM = (
