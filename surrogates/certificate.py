@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .convergence import TOLERANCE, Convergence, convergence
-from .derivatives import MOST_COEFFICIENTS, exponents_of, jacobian_tensor, tensor_size
+from .derivatives import MOST_COEFFICIENTS, exponents_of, inverse_of_mean_slope, jacobian_tensor, tensor_size
 from .enclosures import Floats
 from .injectivity import Proof, prove
 from .inversion import obstacle
@@ -62,7 +62,8 @@ class Certificate:
         Rate of a contraction that is the same as inverting: every chord step brings the settings nearer by it.
     chord_iterations, newton_iterations : int or None
         Steps that suffice for every reachable target, from the centre of the domain and each step clipped to the
-        domain, until every coded setting is within 1e-9 of the exact one.
+        domain, until every coded setting is within 1e-9 of the exact one. Chord steps are with the (pseudo-)inverse
+        of the Jacobian at the centre.
     sub_box : float or None
         Where the claim is not certified: it is on the centred box of this fraction of the ranges.
     """
@@ -154,18 +155,20 @@ def _certified(proof: Proof, found: Convergence | None) -> Certificate:
         return Certificate(
             CLAIM, Verdict.CERTIFIED, f"Bernstein enclosure, {proof.method}", None, (), f"{reason}{kind} everywhere"
         )
-    steps = f"{found.chord} chord steps"
-    if found.newton is not None:
-        steps = f"{found.newton} Newton steps, or {steps},"
+    steps = (("Newton", found.newton), ("chord", found.chord))
+    counted = " or ".join(f"{count} {kind} steps" for kind, count in steps if count is not None)
+    told = [f"{reason}within {proof.rate:.3g} of it everywhere"]
+    if counted:
+        told.append(f"from the centre, {counted} give every reachable target to {TOLERANCE:g} of the half-ranges")
+    if found.condition is not None:
+        told.append(f"the condition number is at most {found.condition:.3g}")
     return Certificate(
         CLAIM,
         Verdict.CERTIFIED,
         f"Bernstein enclosure, {proof.method}",
         found.condition,
         (),
-        f"{reason}within {proof.rate:.3g} of it everywhere; from the centre, {steps} give every reachable target to "
-        f"{TOLERANCE:g} of the half-ranges"
-        + ("" if found.condition is None else f", and the condition number is at most {found.condition:.3g}"),
+        "; ".join(told),
         proof.rate,
         found.chord,
         found.newton,
@@ -190,8 +193,7 @@ def _proof(model: "Surrogate", reach: float = 1.0, **limit: int) -> tuple[Floats
     left = np.zeros((len(model.factors), len(model.responses)))
     corners = np.random.default_rng(0).uniform(-reach, reach, (64, len(model.factors)))
     for points in (np.zeros((1, len(model.factors))), np.vstack([corners, -corners])):
-        slope = model.jacobian_coded(points).mean(axis=0) / model.scale[:, None]
-        left = np.linalg.pinv(slope) / model.scale
+        left = inverse_of_mean_slope(model, points)
         if np.isfinite(left).all() and (proof := prove(jacobian_tensor(model, left), reach, **limit)):
             return left, proof
     return left, None

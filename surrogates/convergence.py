@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .derivatives import curvature_bound
+from .derivatives import curvature_bound, inverse_of_mean_slope
 from .enclosures import ENLARGED, Floats
 from .injectivity import Proof
 
@@ -25,8 +25,9 @@ class Convergence:
 
     Parameters
     ----------
-    chord : int
-        Steps x ← x − A (f(x) − y) with the constant matrix A of the proof.
+    chord : int or None
+        Steps x ← x − A (f(x) − y) with A the (pseudo-)inverse of the Jacobian at the centre; None if the proof
+        took another matrix, which a reader of the certificate would not have.
     newton : int or None
         Newton steps; None if the bounds promise no convergence from the centre, or the map is not square.
     condition : float or None
@@ -34,7 +35,7 @@ class Convergence:
         is not square.
     """
 
-    chord: int
+    chord: int | None
     newton: int | None
     condition: float | None
 
@@ -54,7 +55,9 @@ def convergence(model: "Surrogate", left: Floats, proof: Proof) -> Convergence |
     q, v = proof.rate, proof.weights
     start = float((1.0 / v).max() * ENLARGED)
     wanted = TOLERANCE / float(v.max())
-    chord = 1 if q == 0.0 else max(1, ceil(log(wanted / start) / log(q) * ENLARGED))
+    chord: int | None = 1 if q == 0.0 else max(1, ceil(log(wanted / start) / log(q) * ENLARGED))
+    if not np.array_equal(left, inverse_of_mean_slope(model, np.zeros((1, len(model.factors))))):
+        chord = None
     if len(model.responses) != len(model.factors):
         return Convergence(chord, None, None)
     square = curvature_bound(model, left, v) / (2.0 * (1.0 - q)) * ENLARGED

@@ -56,6 +56,12 @@ def jacobian_tensor(model: "Surrogate", left: Floats) -> Ball:
     return Ball(mid, rad)
 
 
+def inverse_of_mean_slope(model: "Surrogate", points: Floats) -> Floats:
+    """Pseudo-inverse of the mean Jacobian over coded `points`, shape (n_factors, n_responses); responses in SI."""
+    slope = model.jacobian_coded(points).mean(axis=0) / model.scale[:, None]
+    return np.linalg.pinv(slope) / model.scale
+
+
 def curvature_bound(model: "Surrogate", left: Floats, weights: Floats) -> float:
     """Lipschitz constant of ``left @ J`` on the box in the norm max |xᵢ| / weightsᵢ, from the coefficients' sizes."""
     exponents, size = exponents_of(model), mixed(model, left).size

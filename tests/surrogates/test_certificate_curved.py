@@ -12,7 +12,7 @@ from experiments import Terms
 from surrogates import Verdict, certify
 from surrogates.derivatives import jacobian_tensor
 from surrogates.enclosures import Ball, control, product, to_bernstein
-from surrogates.injectivity import contraction_rate, is_definite, prove
+from surrogates.injectivity import contraction_rate, is_definite
 from tests.surrogates.cases import NONLINEAR, box, surrogate, unit_box
 
 
@@ -133,8 +133,7 @@ def test_what_is_certified_has_no_counterexample_and_keeps_its_promises(seed):
                 else np.broadcast_to(slope, (200, *slope.shape))
             )
             found = np.clip(found - np.linalg.solve(at, miss[..., None])[..., 0], -1.0, 1.0)
-        # A proof with the mean Jacobian promises steps with that one; those are not tried here.
-        if steps and (newton or prove(jacobian_tensor(model, np.linalg.pinv(slope) / model.scale)) is not None):
+        if steps:
             assert_allclose(found, points[:200], rtol=0.0, atol=3e-9)
     conditions = np.linalg.cond(model.jacobian_coded(points[:500]) / model.scale[:, None], p=np.inf)
     assert conditions.max() <= certificate.condition
