@@ -2,7 +2,7 @@
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from . import commands
 from .compilation import keep_compiled
@@ -66,14 +66,7 @@ def _parser() -> argparse.ArgumentParser:
     sub = verb("report", commands.report, "write report.html of a run folder again; runs nothing")
     sub.add_argument("folder", metavar="RUN_DIR")
 
-    for name, function, table, summary in (
-        ("predict", commands.predict, "IN.csv", "responses at settings from a CSV"),
-        ("invert", commands.invert, "TARGETS.csv", "settings for responses from a CSV"),
-    ):
-        sub = verb(name, function, summary)
-        sub.add_argument("model", metavar="MODEL.json")
-        sub.add_argument("table", metavar=table, help="CSV with one named column each; '-' reads standard input")
-        sub.add_argument("--out", metavar="FILE", help="write the answers there instead of printing them")
+    _add_tables(verb)
 
     sub = verb("export", commands.export, "generate code from a model")
     sub.add_argument("model", metavar="MODEL.json")
@@ -84,3 +77,23 @@ def _parser() -> argparse.ArgumentParser:
 
     verb("list", commands.list_known, "list oracles, designs and export targets with their settings")
     return parser
+
+
+def _add_tables(verb: Callable[[str, object, str], argparse.ArgumentParser]) -> None:
+    """The commands that answer a table: ``predict`` and ``invert``."""
+    for name, function, table, summary in (
+        ("predict", commands.predict, "IN.csv", "responses at settings from a CSV"),
+        ("invert", commands.invert, "TARGETS.csv", "settings for responses from a CSV"),
+    ):
+        sub = verb(name, function, summary)
+        sub.add_argument("model", metavar="MODEL.json")
+        sub.add_argument("table", metavar=table, help="CSV with one named column each; '-' reads standard input")
+        sub.add_argument("--out", metavar="FILE", help="write the answers there instead of printing them")
+        if name == "invert":
+            sub.add_argument("--all", action="store_true",
+                             help="all settings in the domain that give a target, a row each")  # fmt: skip
+        if name == "predict":
+            sub.add_argument("--outside", choices=("flag", "refuse"), default="flag",
+                             help="settings outside the domain: answer and mark them, or refuse")  # fmt: skip
+            sub.add_argument("--interval", type=float, metavar="LEVEL",
+                             help="add the ends of prediction intervals of this level: 0.9, 0.95 or 0.99")  # fmt: skip

@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from experiments import designs, oracles, settings
-from surrogates import Surrogate, exports, load, obstacle
+from surrogates import Inversion, Surrogate, exports, load, obstacle
+from surrogates.domain import outside_sentence
+from surrogates.preimages import Preimages
 
 from . import tables
 from .config import dump_config, load_config
@@ -16,6 +18,8 @@ from .errors import InputError, RequirementNotMet
 from .reading import read_points
 from .store import RunFolder
 from .study import resolve
+
+MORE_FACTORS = "there are more factors than responses that follow independently, or one acts on none"
 
 
 def run(arguments: Namespace) -> int | None:
@@ -49,9 +53,16 @@ def plan(arguments: Namespace) -> None:
     fill = stages.fill_design(study, study.space.names)
     terms = study.candidates(n)
     design_table(fill, f"Fit, if all {n} factors act: {len(fill)} runs, {fill.method}, {len(terms)} candidate terms")
-    n_validation = study.config.validation.n_runs
+    n_validation, looks, most_fit = study.config.validation.n_runs, study.most_looks, len(fill)
+    if study.config.require.max_runs is not None:
+        most_fit = study.config.require.max_runs
+        console.print(
+            f"The fit may grow to {most_fit} runs, until require.max_relative_error holds; each time that it may hold "
+            f"takes validation runs of its own, up to {looks} times."
+        )
     console.print(f"Validation: {n_validation} random runs; inversion: up to {n_validation} more.")
-    console.print(f"At most {len(screening) + folded + len(fill) + 2 * n_validation} runs in all. Nothing was run.")
+    most = len(screening) + folded + most_fit + (looks + 1) * n_validation
+    console.print(f"At most {most} runs in all. Nothing was run.")
 
 
 def report(arguments: Namespace) -> None:
@@ -66,10 +77,16 @@ def predict(arguments: Namespace) -> None:
     """``flexdoce predict``."""
     model = _model(arguments.model)
     points = read_points(_text(arguments.table), model.factors, _origin(arguments.table))
-    inside = model.contains(points)
-    _emit(tables.prediction_csv(model, points, inside), arguments.out)
-    if not inside.all():
-        _warn(f"{np.sum(~inside)} of {len(points)} rows lie outside the model's domain; their status is 'outside'")
+    if arguments.outside == "refuse" and (why := outside_sentence(model.factors, points)):
+        raise InputError(f"{_origin(arguments.table)}: {why}; with --outside flag they are answered and marked")
+    try:
+        text = tables.prediction_csv(model, points, arguments.interval)
+    except ValueError as error:
+        raise InputError(f"{arguments.model}: {error}") from None
+    _emit(text, arguments.out)
+    outside = int(np.sum(~model.contains(points)))
+    if outside:
+        _warn(f"{outside} of {len(points)} rows lie outside the model's domain; their status is 'outside'")
 
 
 def invert(arguments: Namespace) -> None:
@@ -81,12 +98,40 @@ def invert(arguments: Namespace) -> None:
             f"{arguments.model} has no inverse: {why}; in Python, model.invert(...).nearest_settings come nearest"
         )
     inversion = model.invert(targets)
+    if arguments.all:
+        found = [model.preimages(target) for target in targets]
+        _emit(tables.preimages_csv(targets, inversion, found, model), arguments.out)
+        _warn_of_preimages(found)
+        return
     _emit(tables.inversion_csv(targets, inversion, model.factors, model.responses), arguments.out)
-    if not inversion.ok.all():
+    _warn_of_inversion(inversion)
+
+
+def _warn_of_inversion(inversion: Inversion) -> None:
+    n = len(inversion.status)
+    if several := int((inversion.count > 1).sum()):
+        _warn(f"{several} of {n} targets have several preimages; the settings given are one of them, --all lists them")
+    if free := int(inversion.continuum.sum()):
+        _warn(f"{free} of {n} targets have a continuum of preimages: {MORE_FACTORS}; one is given")
+    if refused := int((~inversion.ok).sum()):
         _warn(
-            f"{np.sum(~inversion.ok)} of {len(targets)} targets are out of reach and were refused; "
+            f"{refused} of {n} targets are out of reach and were refused; "
             "the columns nearest_* hold the nearest responses that can be reached"
         )
+
+
+def _warn_of_preimages(found: list[Preimages]) -> None:
+    n = len(found)
+    if several := sum(len(one) > 1 for one in found):
+        _warn(f"{several} of {n} targets have several preimages, one row each")
+    if free := sum(one.continuum for one in found):
+        _warn(f"{free} of {n} targets have a continuum of preimages: {MORE_FACTORS}; one is given")
+    if doubtful := [one for one in found if not one.complete and not one.continuum]:
+        _warn(
+            f"{len(doubtful)} of {n} lists of preimages are not proven to be complete; the first: {doubtful[0].reason}"
+        )
+    if refused := sum(not len(one) for one in found):
+        _warn(f"{refused} of {n} targets are out of reach; the columns nearest_* hold responses that can be reached")
 
 
 def export(arguments: Namespace) -> None:

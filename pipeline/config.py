@@ -89,18 +89,30 @@ class FitTable(Table):
     """The polynomial and the design that it is fitted on."""
 
     design: FillDesign = FillDesign()
-    degree: int = Field(default=2, ge=1, le=5, description="highest total degree of the candidate terms")
+    degree: Annotated[int, Field(ge=1, le=12)] | Literal["auto"] = Field(
+        default=2, description="highest total degree of the candidate terms; auto: chosen for each response"
+    )
+    highest_degree: int = Field(default=5, ge=1, le=12, description="up to which degree 'auto' looks")
     interactions: bool = Field(default=True, description="whether products of different factors are candidates")
     trim: bool = Field(default=True, description="whether terms that the data do not support are removed")
-    selection: Literal["backward", "forward"] = Field(
+    selection: Literal["backward", "forward", "lars", "adaptive_lasso", "evidence"] = Field(
         default="backward",
-        description="backward: from a fit of all candidates; forward: term by term, fewer runs than candidates will do",
+        description="backward: from a fit of all candidates; evidence: all, each as large as smoothness allows; "
+        "forward, lars, adaptive_lasso: term by term; all but backward do with fewer runs than candidates",
+    )
+    basis: Literal["monomial", "legendre", "chebyshev"] | None = Field(
+        default=None, description="polynomials among which terms are chosen; Legendre's for evidence, else monomials"
     )
     heredity: Literal["none", "weak", "strong"] = Field(
         default="none", description="for forward selection: whether a product needs its parts in the model"
     )
     gradients: bool = Field(
-        default=False, description="whether the oracle's Jacobian at each run teaches, too (forward selection only)"
+        default=False, description="whether the oracle's Jacobian at each run teaches, too (evidence and forward)"
+    )
+    transform: Literal["none", "log", "auto"] = Field(
+        default="none",
+        description="log: logarithms of the responses are fitted, all of which must be positive; auto: where that "
+        "predicts runs left out better",
     )
     runs_per_term: float = Field(
         default=1.5, ge=1.0, le=100.0, description="runs per candidate term, where n_runs is not given"
@@ -118,6 +130,13 @@ class RequireTable(Table):
 
     max_relative_error: Number | None = Field(
         default=None, gt=0.0, description="largest error on fresh runs over the response's range, every response"
+    )
+    max_runs: int | None = Field(
+        default=None,
+        ge=2,
+        le=10_000_000,
+        description="runs that the fit may grow to, terms first, until max_relative_error holds; not given: it does "
+        "not grow",
     )
     certified_inverse: bool = Field(default=False, description="whether the inverse must be certified")
 
@@ -223,7 +242,11 @@ def _sentence(error: ValidationError) -> str:
     allowed = first["msg"].removeprefix("Input ").replace("valid ", "").replace("a integer", "a whole number")
     if first["type"] in {"model_type", "model_attributes_type", "dict_type"}:
         allowed = "should be a table"
-    if _is_type_tag(first["loc"][-1]):
+    beside = [p for p in problems if p["loc"][:-1] == first["loc"][:-1]]
+    words = [p.get("ctx", {}).get("expected", "") for p in beside if p["type"] == "literal_error"]
+    if words and first["type"] != "literal_error":
+        allowed += f" or {words[0]}"
+    elif _is_type_tag(first["loc"][-1]):
         allowed = "should be a finite number, a text, true or false"
     if where == "version":
         allowed = "should be 1"
@@ -234,7 +257,8 @@ def _sentence(error: ValidationError) -> str:
 
 def _is_type_tag(part: Any) -> bool:
     """Whether pydantic put the name of a type, not a key, in an error's location."""
-    return part in {"bool", "int", "float", "str", "constrained-float"}
+    plain = {"bool", "int", "float", "str", "constrained-int", "constrained-float"}
+    return part in plain or str(part).startswith("literal[")
 
 
 def _known_keys(location: Sequence[Any]) -> list[str]:

@@ -85,6 +85,8 @@ def summary(outcome: Outcome) -> None:
             loop,
         )
     console.print(table)
+    if len(outcome.rounds) > 1:
+        _rounds(outcome)
     _adequacy(outcome)
     _inverse(outcome)
     seconds = np.sum(list(outcome.seconds.values()))
@@ -94,6 +96,19 @@ def summary(outcome: Outcome) -> None:
         places["Code"] = "exports"
     for what, name in places.items():
         console.print(f"{what + ':':<8}[bold]{escape(str(outcome.path / name))}[/bold]", soft_wrap=True)
+
+
+def _rounds(outcome: Outcome) -> None:
+    """How the fit grew, one line per round."""
+    table = Table(title="How the fit grew", title_justify="left", header_style="bold", box=SIMPLE_HEAD, padding=(0, 1))
+    table.add_column("step", overflow="fold")
+    for heading in ("runs", "degree", "left out", "expected", "fresh runs"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for one in outcome.rounds:
+        errors = ["–" if e is None else f"{100 * e:.2g} %" for e in (one.loo, one.expected, one.error)]
+        table.add_row(one.step, str(one.runs), str(one.degree), *errors)
+    console.print(table)
+    console.print(f"It ended there: {outcome.rounds[-1].then}.")
 
 
 def _adequacy(outcome: Outcome) -> None:
@@ -120,5 +135,5 @@ def _inverse(outcome: Outcome) -> None:
 
 def _title(outcome: Outcome) -> str:
     model = outcome.model
-    kind = "linear" if model.is_affine else f"degree-{model.terms.degrees.max()}"
+    kind = "linear" if model.is_affine_map else f"degree-{model.terms.degrees.max()}"
     return f"{outcome.study.config.name}: {kind} model, {model.validation[0].n_runs} fresh runs"

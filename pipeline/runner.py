@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -13,13 +13,18 @@ from experiments.screening import Adequacy, Screening
 from surrogates import RoundTrip, Surrogate, dumps, exports, loads, obstacle
 
 from . import stages, tables
-from .config import load_config
+from .config import FitTable, load_config
 from .errors import FlexdoceError, InputError
 from .executors import Progress, execute, silent
+from .growth import Grown, grow, wider
 from .provenance import provenance_json, read_provenance
 from .reading import Table, read_runs
+from .rounds import Round, read_rounds, rounds_csv
+from .stages import Fitted
 from .store import RunFolder
 from .study import STAGES, Study, resolve
+
+ROUNDS = "fit/rounds.csv"
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +47,8 @@ class Outcome:
         Declared requirements that do not hold.
     seconds : dict
         Wall time by stage; empty for a folder that was read back.
+    rounds : tuple of Round
+        How the fit came about; more than one only where the config has runs to add.
     """
 
     path: Path
@@ -55,11 +62,19 @@ class Outcome:
     round_trip: RoundTrip | None
     shortfalls: tuple[str, ...]
     seconds: dict[str, float] = field(default_factory=dict)
+    rounds: tuple[Round, ...] = ()
 
     @property
     def adequacy(self) -> Adequacy:
         """Whether main effects tell who acts."""
         return stages.adequacy(self.study, self.screening)
+
+    @property
+    def fit(self) -> FitTable:
+        """How the model was fitted: as configured, or more widely where the fit grew."""
+        fit, origin = self.study.config.fit, self.model.provenance
+        used = origin.get("fit_degree", fit.degree), origin.get("fit_selection", fit.selection)
+        return fit if used == (fit.degree, fit.selection) else wider(fit)
 
     @property
     def obstacle(self) -> str:
@@ -111,6 +126,8 @@ class _Runner:
         self.study, self.folder, self.progress = study, folder, progress
         self.points = folder.points(study.oracle)
         self.seconds: dict[str, float] = {}
+        self.fit_runs: Runs | None = None
+        self.is_again = study.config.require.max_runs is not None and (folder.path / "model.json").is_file()
 
     def run(self) -> Outcome:
         study, folder, started = self.study, self.folder, datetime.now(UTC)
@@ -124,13 +141,8 @@ class _Runner:
             kept = stages.kept_factors(study, screening)
         with self._timed("fill design"):
             fill = stages.fill_design(study, kept)
-        with self._timed("fit"):
-            fit_runs = self._executed("fit", fill)
-            model = stages.fitted(study, kept, fit_runs)
-        with self._timed("validation"):
-            validation_runs = self._executed("validation", stages.validation_design(study))
-            model = stages.validated(study, model, validation_runs)
-            folder.write("validation/errors.csv", tables.errors_csv(model.validation, model.responses))
+        grown = self._grown(kept, fill)
+        fit_runs, model, validation_runs = grown.fit_runs, grown.model, grown.validation_runs
         trip = None
         if obstacle(model):
             folder.discard("inversion")
@@ -140,10 +152,9 @@ class _Runner:
         with self._timed("export"):
             folder.write("model.json", dumps(model))
             self._export()
-        shortfalls = tuple(stages.shortfalls(study, model))
         outcome = Outcome(
-            folder.path, study, screening_runs, screening, kept, fit_runs, model, validation_runs, trip, shortfalls,
-            self.seconds,
+            folder.path, study, screening_runs, screening, kept, fit_runs, model, validation_runs, trip,
+            tuple(stages.shortfalls(study, model, grown.rounds)), self.seconds, grown.rounds,
         )  # fmt: skip
         folder.write("provenance.json", provenance_json(started, datetime.now(UTC), self.seconds))
         with self._timed("report"):
@@ -154,8 +165,51 @@ class _Runner:
     def _executed(self, stage: str, design: Design) -> Runs:
         self.folder.write(f"{stage}/design.csv", tables.design_csv(design))
         runs = execute(self.study.oracle, design, self.points, stage, self.progress)
-        self.folder.write(f"{stage}/runs.csv", tables.runs_csv(runs))
+        self._write_runs(stage, runs)
         return runs
+
+    def _write_runs(self, stage: str, runs: Runs) -> None:
+        self.folder.write(f"{stage}/design.csv", tables.design_csv(runs.design))
+        self.folder.write(f"{stage}/runs.csv", tables.runs_csv(runs))
+
+    def _grown(self, kept: tuple[str, ...], fill: Design) -> Grown:
+        """The fit and its validation; more of them, if the config has runs to add."""
+        study, folder = self.study, self.folder
+        grown = grow(study, kept, fill, self)
+        with self._timed("validation"):
+            table = tables.errors_csv(grown.model.validation, grown.model.responses, study.space)
+            if self.is_again:
+                self._write_runs("fit", grown.fit_runs)
+                self._write_runs("validation", grown.validation_runs)
+                folder.write(ROUNDS, rounds_csv(grown.rounds))
+            folder.write("validation/errors.csv", table)
+        with self._timed("fit"):
+            model = stages.certified(study, kept, grown.model, grown.fitted.fit)
+        return replace(grown, model=model)
+
+    def fit(self, kept: tuple[str, ...], design: Design, choices: Sequence[FitTable]) -> tuple[Runs, Fitted]:
+        """For `grow`: run `design`, and fit it in the best of the ways."""
+        with self._timed("fit"):
+            if self.fit_runs is None or self.fit_runs.design is not design:
+                self.fit_runs = self._tried("fit", design)
+            return self.fit_runs, stages.fitted(self.study, kept, self.fit_runs, choices)
+
+    def judge(self, model: Surrogate, look: int) -> tuple[Surrogate, Runs]:
+        """For `grow`: the model with its errors on fresh runs, and those runs."""
+        with self._timed("validation"):
+            runs = self._tried("validation", stages.validation_design(self.study, look))
+            return stages.validated(self.study, model, runs), runs
+
+    def note(self, rounds: Sequence[Round]) -> None:
+        """For `grow`: keep the rounds so far."""
+        if not self.is_again:
+            self.folder.write(ROUNDS, rounds_csv(rounds))
+
+    def _tried(self, stage: str, design: Design) -> Runs:
+        """As `_executed`, but the files of a finished study stay as they are until its last round is there again."""
+        if not self.is_again:
+            return self._executed(stage, design)
+        return execute(self.study.oracle, design, self.points, stage, self.progress)
 
     def _round_trip(self, model: Surrogate, validation_runs: Runs) -> RoundTrip:
         targets, inversion, design = stages.inversion_design(model, validation_runs)
@@ -179,7 +233,7 @@ class _Runner:
             self.progress(stage, 0, 0)
         begin = time.perf_counter()
         yield
-        self.seconds[stage] = time.perf_counter() - begin
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begin
         if stage not in STAGES:
             self.progress(stage, 1, 1)
 
@@ -203,9 +257,11 @@ def read_run(path: str | Path) -> Outcome:
         kept = stages.kept_factors(study, screening)
     except (ValueError, FlexdoceError) as error:
         raise InputError(f"the run folder {folder.path} is damaged: {error}; run the study again") from None
-    shortfalls = tuple(stages.shortfalls(study, model))
+    grows = study.config.require.max_runs is not None
+    rounds = read_rounds(folder.read(ROUNDS), str(folder.path / ROUNDS)) if grows else ()
     return Outcome(
-        folder.path, study, runs["screening"], screening, kept, runs["fit"], model, runs["validation"], trip, shortfalls
+        folder.path, study, runs["screening"], screening, kept, runs["fit"], model, runs["validation"], trip,
+        tuple(stages.shortfalls(study, model, rounds)), rounds=rounds,
     )  # fmt: skip
 
 

@@ -1,20 +1,25 @@
 """The stages: pure functions from one noun to the next. Nothing here touches the disk or runs an oracle."""
 
 import hashlib
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import surrogates
-from experiments.designs import Design, Random
+from experiments.designs import Design, Random, Uniform
 from experiments.runs import Runs
 from experiments.screening import Adequacy, NextDesign, Screening, screen
 from surrogates import Inversion, RoundTrip, Surrogate, Verdict, certify, errors, obstacle, round_trip
+from surrogates.candidates import BETTER
+from surrogates.links import NotPositive
 
-from .config import dump_config
+from .config import FitTable, dump_config
 from .errors import InputError, TooManyFailures
-from .study import Study, check_levels, check_runs
+from .rounds import Round, ending
+from .study import Study, check_levels, check_runs, highest_degree
 from .version import __version__
 
 INVERSE = "inverse"
@@ -67,34 +72,114 @@ def fill_design(study: Study, kept: tuple[str, ...]) -> Design:
     return design.embed(study.space)
 
 
-def validation_design(study: Study) -> Design:
-    """Fresh random runs over all factors, so that the price of a dropped one shows."""
-    return Random(study.config.validation.n_runs).generate(study.space, study.seed("validation"))
+def grown_design(study: Study, kept: tuple[str, ...], before: Design, n_runs: int, number: int) -> Design:
+    """`before` with runs added, which fill what it leaves empty, to `n_runs` in all; the first of them are its own.
+
+    Parameters
+    ----------
+    study : Study
+    kept : tuple of str
+        Factors that are filled.
+    before : Design
+        On all factors, as :func:`fill_design` or this function made it.
+    n_runs, number : int
+        Which addition it is, from 1, seeds the search.
+    """
+    inner, columns = study.space.select(kept), [study.space.index(name) for name in kept]
+    method: Any = study.fill_method(len(kept))
+    if isinstance(method, Uniform):
+        levels = study.finest(method, len(kept))
+        given = Design(inner, before.coded[:, columns], before.method)
+        finer = replace(method, n_runs=levels, levels=levels)
+        design = finer.augment(given, n_runs - len(before), study.seed("fit", number))
+    else:
+        design = replace(method, n_runs=n_runs).generate(inner, study.seed("fit"))
+    # Settings that were run keep their last bit, or the store would not know them.
+    coded = np.vstack([before.coded, design.embed(study.space).coded[len(before) :]])
+    return Design(study.space, coded, before.method)
 
 
-def fitted(study: Study, kept: tuple[str, ...], runs: Runs) -> Surrogate:
-    """The trimmed polynomial on the kept factors, as a model of all factors."""
+def validation_design(study: Study, look: int = 0) -> Design:
+    """Fresh random runs over all factors, so that the price of a dropped one shows; others for every look."""
+    return Random(study.config.validation.n_runs).generate(study.space, study.seed("validation", look))
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A fit that is not certified yet.
+
+    Parameters
+    ----------
+    model : Surrogate
+    fit : FitTable
+        How it was fitted.
+    loo : ndarray, shape (n_responses,)
+        Leave-one-out RMSE over the range of the runs; of the largest value where a response does not move.
+    """
+
+    model: Surrogate
+    fit: FitTable
+    loo: NDArray[np.float64]
+
+
+def fitted(study: Study, kept: tuple[str, ...], runs: Runs, choices: Sequence[FitTable] = ()) -> Fitted:
+    """The polynomial on the kept factors, as a model of all factors, fitted in the best of some ways.
+
+    Parameters
+    ----------
+    study : Study
+    kept : tuple of str
+    runs : Runs
+    choices : sequence of FitTable
+        Ways to fit, by default that of the config. A later one must be clearly better, by the leave-one-out error of
+        the response where that is largest.
+    """
     tolerate(study, runs, "fit")
     done = runs.completed()
-    inner = study.space.select(kept)
-    columns = [study.space.index(name) for name in kept]
-    needed = study.fewest_runs(len(kept))
-    if len(done) < needed:
+    ways = [(fit, study.fewest_runs(len(kept), fit)) for fit in choices or [study.config.fit]]
+    if len(done) < min(needed for _, needed in ways):
+        needed = ways[0][1]
         raise TooManyFailures(f"{len(done)} runs are left of the {needed} that the fit needs: {runs.failures()}")
-    fit = study.config.fit
+    slopes = _slopes(study, done, [study.space.index(name) for name in kept])
+    found = [_fitted(study, kept, done, fit, slopes) for fit, needed in ways if len(done) >= needed]
+    best = found[0]
+    for other in found[1:]:
+        best = other if other.loo.max() < BETTER * best.loo.max() else best
+    return best
+
+
+def _fitted(study: Study, kept: tuple[str, ...], done: Runs, fit: FitTable, slopes: Any) -> Fitted:
+    columns = [study.space.index(name) for name in kept]
     # Taken from the package when it is needed: the estimator brings scikit-learn.
     regressor = surrogates.PolynomialRegressor(
         degree=fit.degree,
+        highest_degree=fit.highest_degree,
         interactions=fit.interactions,
         trim=fit.trim,
         selection=fit.selection,
         heredity=fit.heredity,
+        basis=fit.basis,
         resolution=study.oracle.resolution,
-        space=inner,
+        space=study.space.select(kept),
         responses=study.oracle.responses,
-    ).fit(done.design.physical[:, columns], done.values, _slopes(study, done, columns))
-    surrogate = regressor.surrogate_.embed(study.space)
-    return replace(surrogate, certificate=certify(surrogate), provenance=provenance(study, kept))
+        response_transform=fit.transform,
+    )
+    try:
+        regressor.fit(done.design.physical[:, columns], done.values, slopes)
+    except NotPositive as error:  # shows only now, with the answers
+        raise InputError(f"fit.transform: {error}") from None
+    spread, largest = np.ptp(done.values, axis=0), np.abs(done.values).max(axis=0)
+    measure = np.where(spread > study.oracle.resolution * largest, spread, largest)
+    loo = regressor.loo_rmse_ / np.where(measure > 0.0, measure, 1.0)
+    return Fitted(regressor.surrogate_.embed(study.space), fit, loo)
+
+
+def certified(study: Study, kept: tuple[str, ...], surrogate: Surrogate, fit: FitTable) -> Surrogate:
+    """The model with its certificate, and where it comes from."""
+    origin = provenance(study, kept)
+    if study.config.require.max_runs is not None:
+        origin |= {"fit_degree": fit.degree, "fit_selection": fit.selection}
+    return replace(surrogate, certificate=certify(surrogate), provenance=origin)
 
 
 def _slopes(study: Study, runs: Runs, columns: list[int]) -> Any:
@@ -134,16 +219,18 @@ def tolerate(study: Study, runs: Runs, stage: str) -> None:
         )
 
 
-def shortfalls(study: Study, surrogate: Surrogate) -> list[str]:
-    """Declared requirements that do not hold, one sentence each."""
+def shortfalls(study: Study, surrogate: Surrogate, rounds: Sequence[Round] = ()) -> list[str]:
+    """Declared requirements that do not hold, one sentence each; how far `rounds` came, for a study that grows."""
     require, found = study.config.require, []
     if require.max_relative_error is not None:
+        advice = "more runs in fit.design.n_runs, a higher fit.degree or narrower ranges may help"
+        if rounds and require.max_runs is not None:
+            advice = ending(rounds, require.max_runs, require.max_relative_error, highest_degree(study.config.fit))
         for error in surrogate.validation:
             if not error.max_relative <= require.max_relative_error:
                 found.append(
                     f"{error.response}: maximum relative error {error.max_relative:.3g} exceeds "
-                    f"require.max_relative_error = {require.max_relative_error:g} (more runs in fit.design.n_runs, "
-                    "a higher fit.degree or narrower ranges may help)"
+                    f"require.max_relative_error = {require.max_relative_error:g} ({advice})"
                 )
     certificate = surrogate.certificate
     if require.certified_inverse and (certificate is None or certificate.verdict is not Verdict.CERTIFIED):

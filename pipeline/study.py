@@ -9,18 +9,33 @@ from typing import Any, TypeVar
 import numpy as np
 
 from experiments import designs, oracles
-from experiments.designs import Design, DesignMethod
+from experiments.designs import Design, DesignMethod, Halton, Random, Sobol, Uniform
+from experiments.designs.uniform import MOST_RUNS
 from experiments.factors import FactorSpace
 from experiments.oracles import Oracle
 from experiments.screening import count_contrasts
 from experiments.terms import Terms
 from surrogates import Surrogate, exports
-from surrogates.stepwise import FULLEST, check_selection
+from surrogates.candidates import AUTO
+from surrogates.choosing import TAUGHT, Choice, natural_basis
+from surrogates.stepwise import FULLEST
 
-from .config import Config
+from .config import Config, FitTable
 from .errors import InputError
 
 T = TypeVar("T")
+
+QUADRATIC = 2
+"""Degree by whose terms a filling design is sized where the degree is to be chosen."""
+
+GROWTH, NEARLY = 1.5, 1.2
+"""A fit grows to so many times its runs, or at once to the most allowed if that is less than `NEARLY` times as many."""
+
+ROOMY = 2
+"""Settings of a grid for every run that a growing design may have; with fewer it would repeat itself."""
+
+SEQUENCES = (Sobol, Halton, Random)
+"""Designs of which a longer one begins with the shorter one."""
 
 STAGES = ("screening", "fit", "validation", "inversion")
 """Stages that run the oracle, in order; each has a folder of its own and a seed of its own."""
@@ -62,22 +77,60 @@ class Study:
         return method.generate(self.space, self.seed("screening"))
 
     def candidates(self, n_factors: int) -> Terms:
-        """Candidate terms for that many factors."""
+        """Candidate terms for that many factors; those of a quadratic where the degree is to be chosen."""
         names = [f"x{i}" for i in range(n_factors)]
-        return Terms.polynomial(names, self.config.fit.degree, self.config.fit.interactions)
+        degree = self.config.fit.degree
+        return Terms.polynomial(names, QUADRATIC if degree == AUTO else int(degree), self.config.fit.interactions)
 
-    def fewest_runs(self, n_factors: int) -> int:
-        """Runs below which no polynomial of the config can be fitted in that many factors.
+    def fewest_runs(self, n_factors: int, fit: FitTable | None = None) -> int:
+        """Runs below which no polynomial of the config, or of `fit`, can be fitted in that many factors.
 
-        As many as candidates; for forward selection as many as let all linear terms enter.
+        As many as let all linear terms enter; for backward selection, which starts from all, as many as candidates.
         """
-        if self.config.fit.trim and self.config.fit.selection == "forward":
+        fit = fit or self.config.fit
+        if fit.degree == AUTO or (fit.trim and fit.selection != "backward"):
             return ceil((n_factors + 1) / FULLEST)
         return len(self.candidates(n_factors))
 
-    def seed(self, stage: str) -> np.random.SeedSequence:
-        """The seed of one stage; streams are independent, so changing one stage leaves the others alone."""
-        return _seed(self.config, stage)
+    def sizes(self, first: int) -> tuple[int, ...]:
+        """Runs in all after each addition to a filling design of `first` runs; empty if it does not grow.
+
+        Multiples of the design's levels, so that they stay in balance, but for the last.
+        """
+        levels = self.config.fit.design.settings.get("levels", Uniform.levels)
+        levels = levels if self.config.fit.design.method == Uniform.method else 1
+        found, n, most = [], first, self.config.require.max_runs or 0
+        while n < most:
+            n = ceil(GROWTH * n / levels) * levels
+            n = n if NEARLY * n < most else most
+            found.append(n)
+        return tuple(found)
+
+    @property
+    def most_looks(self) -> int:
+        """How often fresh validation runs may be needed: once, or as often as the fit may change."""
+        if self.config.require.max_runs is None:
+            return 1
+        smallest: Any = self.fill_method(1)
+        return 2 + len(self.sizes(smallest.n_runs))
+
+    def finest(self, method: Uniform, n_factors: int) -> int:
+        """Levels that a growing uniform design needs: old ones stay, and new ones come between where there are too few.
+
+        They must show the highest degree, and must not run out of settings.
+        """
+        highest, levels = highest_degree(self.config.fit), method.levels
+        while levels <= highest or levels**n_factors < ROOMY * (self.config.require.max_runs or 0):
+            levels = 2 * levels - 1
+        return levels
+
+    def seed(self, stage: str, number: int = 0) -> np.random.SeedSequence:
+        """The seed of one stage; streams are independent, so changing one stage leaves the others alone.
+
+        So are those of further designs of the same stage, by number.
+        """
+        seed = _seed(self.config, stage)
+        return seed.spawn(number)[-1] if number else seed
 
 
 def resolve(config: Config) -> Study:
@@ -107,11 +160,20 @@ def resolve(config: Config) -> Study:
         _checked("screening.keep", lambda name=name: space.index(name))
     study = Study(config, oracle, space, design, config.export.prefix or config.name)
     _checked("screening.follow", lambda: study.folded_screening)
-    _checked("fit", lambda: check_selection(config.fit.selection, config.fit.heredity))
+    fit = config.fit
+    _checked(
+        "fit", lambda: Choice(fit.selection, fit.basis or natural_basis(fit.selection), fit.heredity, trim=fit.trim)
+    )
     _check_gradients(study)
     _check_fill(study)
+    _check_growth(study)
     _check_exports(study)
     return study
+
+
+def highest_degree(fit: FitTable) -> int:
+    """Up to which degree a fit that may grow looks."""
+    return fit.highest_degree if fit.degree == AUTO else max(fit.highest_degree, int(fit.degree))
 
 
 def _seed(config: Config, stage: str) -> np.random.SeedSequence:
@@ -137,13 +199,40 @@ def _check_fill(study: Study) -> None:
         check_runs(study, n_factors, method.n_runs)
 
 
+def _check_growth(study: Study) -> None:
+    """Refuse a budget that has nothing to reach, nothing to grow, or no room."""
+    require, n_factors = study.config.require, len(study.space)
+    if require.max_runs is None:
+        return
+    if require.max_relative_error is None:
+        raise InputError("require.max_runs needs require.max_relative_error: say which error the runs are to reach")
+    method: Any = study.fill_method(n_factors)
+    if not isinstance(method, (Uniform, *SEQUENCES)):
+        names = ", ".join(repr(kind.method) for kind in (Uniform, *SEQUENCES))
+        raise InputError(
+            f"require.max_runs: no runs can be added to fit.design.method = {method.method!r}; use one of {names}, or "
+            "leave max_runs out"
+        )
+    if isinstance(method, Uniform) and require.max_runs > MOST_RUNS:
+        raise InputError(
+            f"require.max_runs = {require.max_runs} is more than a uniform design can have; use {MOST_RUNS} or fewer"
+        )
+    if require.max_runs < method.n_runs:
+        sized = "" if "n_runs" in study.config.fit.design.settings else f", if all {n_factors} factors act"
+        raise InputError(
+            f"require.max_runs = {require.max_runs} is fewer than the {method.n_runs} runs that the fit begins with"
+            f"{sized}; use {method.n_runs} or more, or fewer in fit.design.n_runs"
+        )
+
+
 def _check_gradients(study: Study) -> None:
     """Refuse gradients that the oracle does not give or the selection does not take."""
     fit = study.config.fit
     if not fit.gradients:
         return
-    if fit.selection != "forward" or not fit.trim:
-        raise InputError("fit.gradients needs fit.selection = 'forward' and fit.trim = true")
+    if fit.selection not in TAUGHT or not fit.trim:
+        named = " or ".join(repr(name) for name in TAUGHT)
+        raise InputError(f"fit.gradients needs fit.selection = {named} and fit.trim = true")
     if not hasattr(study.oracle, "jacobian"):
         raise InputError(f"fit.gradients: the oracle {study.oracle.name!r} gives no Jacobian; leave it false")
 
@@ -151,10 +240,10 @@ def _check_gradients(study: Study) -> None:
 def check_runs(study: Study, n_factors: int, n_runs: int) -> None:
     """Refuse a filling design with fewer runs than candidate terms."""
     needed = study.fewest_runs(n_factors)
-    if n_runs < needed and study.config.fit.selection == "forward":
+    fit = study.config.fit
+    if n_runs < needed and (fit.selection != "backward" or fit.degree == AUTO):
         raise InputError(
-            f"fit.design: {n_runs} runs are too few for a forward selection in {n_factors} factors; use n_runs = "
-            f"{needed} or more"
+            f"fit.design: {n_runs} runs are too few for a fit in {n_factors} factors; use n_runs = {needed} or more"
         )
     if n_runs < needed:
         raise InputError(
@@ -166,10 +255,13 @@ def check_runs(study: Study, n_factors: int, n_runs: int) -> None:
 
 def check_levels(config: Config, levels: int) -> None:
     """Refuse a filling design whose factors take too few levels for the degree."""
-    if levels <= config.fit.degree:
+    if config.fit.degree == AUTO:
+        return
+    degree = int(config.fit.degree)
+    if levels <= degree:
         raise InputError(
-            f"fit.design: {levels} levels cannot show a degree of {config.fit.degree}; use {config.fit.degree + 1} "
-            f"levels or more (method = 'uniform', levels = {config.fit.degree + 1}), or a lower fit.degree"
+            f"fit.design: {levels} levels cannot show a degree of {degree}; use {degree + 1} "
+            f"levels or more (method = 'uniform', levels = {degree + 1}), or a lower fit.degree"
         )
 
 

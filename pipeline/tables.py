@@ -1,6 +1,7 @@
 """The nouns as CSV: headers carry name and unit, numbers round-trip."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,9 +12,13 @@ from experiments.factors import FactorSpace
 from experiments.naming import column_label
 from experiments.runs import Response, Runs
 from experiments.screening import Screening
-from surrogates import Inversion, ResponseError, Surrogate
+from surrogates import Inversion, InversionStatus, ResponseError, Surrogate
+from surrogates.preimages import Preimages
 
 from .reading import CODED
+
+CONTINUUM = "inf"
+"""Number of preimages that form a curve or a surface; readers of numbers take it for infinity."""
 
 
 def design_csv(design: Design) -> str:
@@ -54,41 +59,91 @@ def effects_csv(screening: Screening) -> str:
     return _csv(pd.DataFrame(rows))
 
 
-def errors_csv(errors: Sequence[ResponseError], responses: Sequence[Response]) -> str:
-    """One row per response: MAXABS, its ratio to the response's range, RMSE."""
+def errors_csv(errors: Sequence[ResponseError], responses: Sequence[Response], space: FactorSpace | None = None) -> str:
+    """One row per response: MAXABS, RMSE, both over the response's range, Q², intervals with their measured coverage.
+
+    Given the factors, also the settings of the largest error. A cell is empty where a number is not known.
+    """
     units = {r.name: r.unit for r in responses}
-    rows = [
-        {
-            "response": e.response,
-            "unit": units[e.response],
-            "n_runs": e.n_runs,
-            "max_abs": e.max_abs,
-            "range": e.range,
-            "max_relative_to_range": e.max_relative,
-            "rmse": e.rmse,
-            "worst_run": e.worst_run + 1,
-        }
-        for e in errors
-    ]
-    return _csv(pd.DataFrame(rows))
+    levels = sorted({i.level for e in errors for i in e.intervals})
+    return _csv(pd.DataFrame([_error_row(e, units[e.response], levels, space) for e in errors]))
+
+
+def _error_row(error: ResponseError, unit: str, levels: list[float], space: FactorSpace | None) -> dict[str, Any]:
+    intervals = {i.level: i for i in error.intervals}
+    known = space is not None and len(error.worst_point) == len(space)
+    return {
+        "response": error.response,
+        "unit": unit,
+        "n_runs": error.n_runs,
+        "max_abs": error.max_abs,
+        "range": error.range,
+        "max_relative_to_range": error.max_relative,
+        "rmse": error.rmse,
+        "rmse_relative_to_range": error.relative_rmse,
+        "q2": error.q2,
+        **{f"half_width_{v:g}": intervals[v].half_width if v in intervals else None for v in levels},
+        **{f"coverage_{v:g}": intervals[v].coverage if v in intervals else None for v in levels},
+        "worst_run": error.worst_run + 1,
+        **{f"worst_{n}": v for n, v in zip(space.labels if space else (), error.worst_point, strict=known)},
+    }
 
 
 def inversion_csv(
     targets: NDArray[np.float64], inversion: Inversion, space: FactorSpace, responses: Sequence[Response]
 ) -> str:
-    """Targets, the settings found (empty if refused), and the nearest reachable responses."""
-    table = pd.DataFrame(targets, columns=pd.Index([r.label for r in responses]))
-    settings = pd.DataFrame(inversion.settings, columns=pd.Index(space.labels))
-    nearest = pd.DataFrame(inversion.nearest, columns=pd.Index([f"nearest_{r.label}" for r in responses]))
-    status = pd.Series([str(s) for s in inversion.status], name="status")
-    return _csv(pd.concat([table, settings, status, nearest], axis=1))
+    """Targets, the settings found (empty if refused), how many there are, and the nearest reachable responses.
+
+    ``preimages`` is how many settings were found (``inf`` for a continuum), ``complete`` whether no others is proven.
+    """
+    count = np.where(inversion.continuum, CONTINUUM, inversion.count.astype(str))
+    status = [str(s) for s in inversion.status]
+    numbers = targets, inversion.settings, inversion.nearest
+    return _inversion_table(numbers, (status, count, inversion.complete), space, responses)
 
 
-def prediction_csv(model: Surrogate, points: NDArray[np.float64], inside: NDArray[np.bool_]) -> str:
-    """Settings, predicted responses, and whether each setting lies in the model's domain."""
-    columns = [*model.factors.labels, *(r.label for r in model.responses)]
-    table = pd.DataFrame(np.hstack([points, model.predict(points)]), columns=pd.Index(columns))
-    table["status"] = np.where(inside, "ok", "outside")
+def preimages_csv(
+    targets: NDArray[np.float64], inversion: Inversion, found: Sequence[Preimages], model: Surrogate
+) -> str:
+    """As :func:`inversion_csv`, with a row for each of the settings found; one, as refused, where there is none."""
+    rows: list[NDArray[np.float64]] = []
+    words: list[tuple[str, str, bool]] = []
+    for i, one in enumerate(found):
+        settings = one.settings if len(one) else np.full((1, len(model.factors)), np.nan)
+        nearest = model.predict(settings) if len(one) else inversion.nearest[i : i + 1]
+        rows.append(np.hstack([np.tile(targets[i], (len(settings), 1)), settings, nearest]))
+        status = InversionStatus.OK if len(one) else InversionStatus.OUTSIDE
+        count = CONTINUUM if one.continuum else str(len(one))
+        words += [(str(status), count, one.complete)] * len(settings)
+    n, k = len(model.responses), len(model.factors)
+    numbers = np.split(np.vstack([np.empty((0, n + k + n)), *rows]), [n, n + k], axis=1)
+    columns = list(zip(*words, strict=True)) if words else [(), (), ()]
+    return _inversion_table(numbers, columns, model.factors, model.responses)
+
+
+def _inversion_table(
+    numbers: Sequence[NDArray[np.float64]], words: Sequence[Any], space: FactorSpace, responses: Sequence[Response]
+) -> str:
+    """Targets, settings and nearest responses; status, number of preimages and whether they are all."""
+    labels = [r.label for r in responses]
+    columns = labels, space.labels, [f"nearest_{label}" for label in labels]
+    parts = [pd.DataFrame(v, columns=pd.Index(c)) for v, c in zip(numbers, columns, strict=True)]
+    told = pd.DataFrame(dict(zip(("status", "preimages", "complete"), words, strict=True)))
+    return _csv(pd.concat([*parts[:2], told, parts[2]], axis=1))
+
+
+def prediction_csv(model: Surrogate, points: NDArray[np.float64], level: float | None = None) -> str:
+    """Settings, predicted responses, and whether each setting lies inside the model's domain, on its edge, or outside.
+
+    With a level also the ends of that interval, empty outside the domain.
+    """
+    labels = [r.label for r in model.responses]
+    columns, parts = [*model.factors.labels, *labels], [points, model.predict(points)]
+    if level is not None:
+        columns += [f"{end}_{label}" for end in ("low", "high") for label in labels]
+        parts += model.interval(points, level, outside="nan")
+    table = pd.DataFrame(np.hstack(parts), columns=pd.Index(columns))
+    table["status"] = model.guard(points)
     return _csv(table)
 
 

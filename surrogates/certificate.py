@@ -11,6 +11,7 @@ from .derivatives import MOST_COEFFICIENTS, exponents_of, inverse_of_mean_slope,
 from .enclosures import Floats
 from .injectivity import Proof, prove
 from .inversion import obstacle
+from .reachable import Box, response_box
 from .refutation import refute
 
 if TYPE_CHECKING:
@@ -66,6 +67,14 @@ class Certificate:
         of the Jacobian at the centre.
     sub_box : float or None
         Where the claim is not certified: it is on the centred box of this fraction of the ranges.
+    factor_box : tuple of (float, float) or None
+        Low and high of each factor, in its unit, of the box on which the claim is proven: the whole domain or that
+        fraction of it; None where it is proven on none.
+    response_box : tuple of (float, float) or None
+        Low and high of each response, SI: every target in here has exactly one setting in `factor_box`. None where
+        no such box was found.
+    box_reason : str
+        How that was proven, or why there is no such box. Empty in models written before there were any.
     """
 
     claim: str
@@ -78,6 +87,9 @@ class Certificate:
     chord_iterations: int | None = None
     newton_iterations: int | None = None
     sub_box: float | None = None
+    factor_box: Box | None = None
+    response_box: Box | None = None
+    box_reason: str = ""
 
 
 def certify(model: "Surrogate") -> Certificate:
@@ -85,14 +97,25 @@ def certify(model: "Surrogate") -> Certificate:
 
     For an affine model this is a question of rank. For any other it is proven by subdivision with bounds on
     every rounding error (:mod:`.injectivity`), or refuted by a witness that was checked in exact arithmetic
-    (:mod:`.refutation`), or left undecided. Sampling proves nothing and decides nothing.
+    (:mod:`.refutation`), or left undecided. Sampling proves nothing and decides nothing. Where the claim is
+    proven, a box of responses is sought in which every target can be had (:mod:`.reachable`).
     """
-    if model.is_affine:
-        return _certify_affine(model)
-    found = _certify_curved(model)
+    found = _certify_affine(model) if model.is_affine else _certify_curved(model)
     if found.verdict is not Verdict.CERTIFIED and (against := obstacle(model)):
-        return replace(found, reason=f"{found.reason}; it has no inverse: {against}")
-    return found
+        found = replace(found, reason=f"{found.reason}; it has no inverse: {against}")
+    return _with_boxes(model, found)
+
+
+def _with_boxes(model: "Surrogate", found: Certificate) -> Certificate:
+    reach = 1.0 if found.verdict is Verdict.CERTIFIED else found.sub_box
+    if reach is None:
+        return replace(found, box_reason="the claim is proven on no box of factors")
+    half = reach * model.factors.half_range
+    ends = np.column_stack([model.factors.centre - half, model.factors.centre + half])
+    if reach == 1.0:  # the ranges themselves, not what is left of them by rounding
+        ends = np.array([(f.low, f.high) for f in model.factors])
+    box, reason = response_box(model, reach)
+    return replace(found, factor_box=tuple((float(a), float(b)) for a, b in ends), response_box=box, box_reason=reason)
 
 
 def _certify_curved(model: "Surrogate") -> Certificate:
@@ -136,15 +159,12 @@ def _certify_affine(model: "Surrogate") -> Certificate:
             "the inverse returns one of them",
         )
     condition = float(singular[0] / singular[-1])
-    return Certificate(
-        CLAIM,
-        Verdict.CERTIFIED,
-        method,
-        condition,
-        (),
-        f"the model is affine with full column rank (condition number {condition:.3g}): "
-        "its inverse is one matrix product",
+    of_what = "" if model.is_affine_map else " in the logarithms of responses"
+    reason = (
+        f"the model is affine{of_what} with full column rank (condition number {condition:.3g}): "
+        f"its inverse is one matrix product{of_what and ' of them'}"
     )
+    return Certificate(CLAIM, Verdict.CERTIFIED, method, condition, (), reason)
 
 
 def _certified(proof: Proof, found: Convergence | None) -> Certificate:

@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from .selection import Fit, folds, supported
+from .fits import Fit
+from .selection import folds, noise_level, supported
 from .stepwise import as_long, forward_path, parents_of
 
 WEIGHTS = (0.03, 0.1, 0.3, 1.0)
@@ -83,4 +84,6 @@ def _fit(a: NDArray[np.float64], b: NDArray[np.float64], columns: NDArray[np.int
     out = np.full(len(b), np.inf)
     out[sure] = np.linalg.solve(blocks[sure], residuals[sure][..., None])[:, 0, 0]
     spread = np.sqrt((inverse**2).sum(axis=1))
-    return Fit(columns, slope, 0.0, out, np.abs(slope) / np.where(spread > 0.0, spread, np.inf))
+    strength = np.abs(slope) / np.where(spread > 0.0, spread, np.inf)
+    root = inverse @ left * noise_level(residuals, b.size - len(columns))
+    return Fit(columns, slope, 0.0, out, strength, root)

@@ -7,6 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .links import LOG, to_link_units, to_responses
+from .multiplicity import at_most_one, in_continuum, shape_of
+from .multistart import distinct, search, starts
+
 if TYPE_CHECKING:
     from .model import Surrogate
 
@@ -52,9 +56,18 @@ class Inversion:
         The settings that come nearest to the target; equal to `settings` where it was reached.
     nearest : ndarray, shape (n, n_responses)
         The model's responses there, SI: for a refused target the nearest reachable one, distance
-        measured with each response divided by its scale.
+        measured with each response divided by its scale; of a response that is given by its logarithm, its logarithm.
     distance : ndarray, shape (n,)
-        That distance, dimensionless.
+        That distance, dimensionless; infinite where a target is not positive and its logarithm is wanted.
+    count : ndarray of int, shape (n,)
+        Settings found in the domain that give the target: 0 where it was refused, more than 1 where other starts
+        led elsewhere (`settings` holds one); of a continuum, 1. :func:`.preimages` finds and lists them all.
+    complete : ndarray of bool, shape (n,)
+        Proven that there are no others: a certified model, or an affine one of full rank. Of a reached target, that no
+        other setting in the domain has the responses `nearest`; of a refused one, that none gives the target.
+    continuum : ndarray of bool, shape (n,)
+        Shown that the settings that give the target form a curve or a surface through the one given: more factors act
+        than responses follow independently, or one does not act.
     """
 
     settings: NDArray[np.float64]
@@ -62,6 +75,14 @@ class Inversion:
     nearest_settings: NDArray[np.float64]
     nearest: NDArray[np.float64]
     distance: NDArray[np.float64]
+    count: NDArray[np.int64]
+    complete: NDArray[np.bool_]
+    continuum: NDArray[np.bool_]
+
+    @property
+    def unique(self) -> NDArray[np.bool_]:
+        """Which targets have one setting in the domain, by proof, shape (n,)."""
+        return self.ok & self.complete
 
     @property
     def ok(self) -> NDArray[np.bool_]:
@@ -99,10 +120,8 @@ def obstacle(model: "Surrogate") -> str:
     A curved model whose responses outnumber the factors that act on them reaches a surface that nothing
     measured or simulated lies on exactly: off it by the fit's own error, every target would be refused.
     """
-    used = (model.coefficients != 0.0) & (model.terms.degrees > 0)[:, None]
-    exponents = np.array(model.terms.exponents).reshape(len(model.terms), len(model.factors))
-    n_moving, n_acting = int(used.any(axis=0).sum()), int(exponents[used.any(axis=1)].any(axis=0).sum())
-    if model.is_affine or n_moving <= n_acting:
+    n_moving, _, n_acting = shape_of(model)
+    if model.is_affine_map or n_moving <= n_acting:
         return ""
     factors = "1 factor" if n_acting == 1 else f"{n_acting} factors"
     return f"{n_moving} responses follow from {factors}, so that they cannot be chosen independently of each other"
@@ -114,7 +133,7 @@ def affine_map(model: "Surrogate") -> tuple[NDArray[np.float64], NDArray[np.floa
     Raises
     ------
     ValueError
-        If the model has terms above degree one.
+        If the model has terms above degree one, or gives a logarithm.
     """
     _check_affine(model)
     centre = model.factors.centre[None]
@@ -128,7 +147,7 @@ def affine_inverse(model: "Surrogate") -> AffineInverse:
     Raises
     ------
     ValueError
-        If the model has terms above degree one.
+        If the model has terms above degree one, or gives a logarithm.
     """
     _check_affine(model)
     centre, half = model.factors.centre, model.factors.half_range
@@ -155,11 +174,15 @@ def invert(model: "Surrogate", targets: ArrayLike) -> Inversion:
     polynomial with its analytic Jacobian, all targets at once. Where that leaves the box, the
     nearest point of the box is sought; a target is refused only if even that misses it.
 
+    Where a curved model is not certified, Newton's method from more starts looks for other settings that give the
+    same target: they are counted, not proven to be all.
+
     Parameters
     ----------
     model : Surrogate
     targets : array_like, shape (n, n_responses)
-        Wanted responses, SI.
+        Wanted responses, SI. A response that is given by its logarithm is always positive: a target that is not is
+        refused, and what is nearest has this response as small as it gets.
 
     Raises
     ------
@@ -168,6 +191,9 @@ def invert(model: "Surrogate", targets: ArrayLike) -> Inversion:
 
     Notes
     -----
+    All is done in link units, logarithms of targets where the model gives logarithms: a target counts as reached, and
+    is near, by them.
+
     Where there is an :func:`obstacle`, only targets that are consistent to rounding are reached; of any
     other, the nearest settings are a local least-squares answer.
     """
@@ -180,22 +206,31 @@ def invert(model: "Surrogate", targets: ArrayLike) -> Inversion:
         )
     if not np.isfinite(targets).all():
         raise ValueError("targets must be finite")
-    near = _brought_near(model, targets)
-    coded = _gauss_newton(model, near)
-    for i in np.flatnonzero(~_reached(model, coded, near)):
-        coded[i] = _nearest_in_box(model, near[i], coded[i])
-    ok = _reached(model, coded, targets)
+    wanted = to_link_units(model.links, targets)
+    near = _brought_near(model, wanted)
+    coded, single = _gauss_newton(model, near), at_most_one(model)
+    others = [] if single else _others(model, near, coded)
+    for i in np.flatnonzero(~reached(model, coded, near)):
+        coded[i] = others[i][0] if others and len(others[i]) else _nearest_in_box(model, near[i], coded[i])
+    ok = reached(model, coded, wanted)
+    count = ok.astype(np.int64)
+    for i in np.flatnonzero(ok if others else ()):
+        count[i] = len(distinct(np.vstack([coded[i], others[i]])))
     coded = np.clip(coded, -1.0, 1.0)
     nearest = model.predict_coded(coded)
     settings = model.factors.decode(coded)
     with np.errstate(over="ignore"):
-        distance = _distance(nearest / model.scale, targets / model.scale)
+        distance = _distance(nearest / model.scale, wanted / model.scale)
+    distance[np.isneginf(wanted).any(axis=1)] = np.inf
     return Inversion(
         np.where(ok[:, None], settings, np.nan),
         tuple(InversionStatus.OK if k else InversionStatus.OUTSIDE for k in ok),
         settings,
-        nearest,
+        to_responses(model.links, nearest),
         distance,
+        count,
+        single & (ok | model.is_affine),
+        ok & in_continuum(model, coded),
     )
 
 
@@ -203,6 +238,12 @@ def _check_affine(model: "Surrogate") -> None:
     if not model.is_affine:
         raise ValueError(
             "only an affine model has a closed-form inverse and a constant matrix; this one has terms above degree one"
+        )
+    if model.has_logs:
+        raise ValueError(
+            "only an affine model has a closed-form inverse and a constant matrix; this one gives the logarithm of "
+            f"{' and '.join(r.name for r, link in zip(model.responses, model.links, strict=True) if link == LOG)}; "
+            "use model.invert and model.jacobian"
         )
 
 
@@ -234,11 +275,23 @@ def _distance(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.floa
     return largest * np.sqrt((unit**2).sum(axis=1))
 
 
-def _reached(model: "Surrogate", coded: NDArray[np.float64], targets: NDArray[np.float64]) -> NDArray[np.bool_]:
+def reached(model: "Surrogate", coded: NDArray[np.float64], targets: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which coded settings lie in the domain and give their targets, in link units, each to 1e-9, shape (n,)."""
     inside = (np.abs(coded) <= 1.0 + BOX_TOLERANCE).all(axis=1)
     with np.errstate(over="ignore"):
         miss = np.abs(model.predict_coded(coded) - targets) / model.scale
     return np.logical_and(inside, (miss <= TARGET_TOLERANCE).all(axis=1))
+
+
+def _others(model: "Surrogate", targets: NDArray[np.float64], coded: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Settings that other starts find, a list per target; no list where it is affine or no setting stands alone."""
+    n, k = coded.shape
+    shape = shape_of(model)
+    if not n or model.is_affine or min(shape.n_independent, shape.n_acting) < k:
+        return []
+    ends = search(model, targets, starts(k))
+    good = reached(model, ends.reshape(-1, k), np.repeat(targets, ends.shape[1], axis=0)).reshape(n, -1)
+    return [distinct(some[hit]) for some, hit in zip(ends, good, strict=True)]
 
 
 def _gauss_newton(model: "Surrogate", targets: NDArray[np.float64]) -> NDArray[np.float64]:

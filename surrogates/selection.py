@@ -1,44 +1,15 @@
 """Penalty and terms by exact leave-one-out: what the data support, and no more."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
+
+from .fits import Fit
 
 PENALTIES = (0.0, *np.geomspace(1e-12, 1.0, 25))
 """Ridge penalties tried, as fractions of the largest squared singular value of the centred model matrix."""
 
 FOLDS = 10
 """Folds in which the choice of the number of terms is repeated, removal of terms included."""
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """One response fitted on some columns of a model matrix.
-
-    Parameters
-    ----------
-    columns : ndarray of int, shape (n_used,)
-        Columns used.
-    coefficients : ndarray, shape (n_used,)
-    penalty : float
-        The relative ridge penalty chosen.
-    loo : ndarray, shape (n_runs,)
-        Exact leave-one-out residuals.
-    strength : ndarray, shape (n_used,)
-        Each coefficient over its standard error, up to the common noise level.
-    """
-
-    columns: NDArray[np.int64]
-    coefficients: NDArray[np.float64]
-    penalty: float
-    loo: NDArray[np.float64]
-    strength: NDArray[np.float64]
-
-    @property
-    def loo_rmse(self) -> float:
-        """Root mean square of the leave-one-out residuals."""
-        return float(np.sqrt(np.mean(self.loo**2)))
 
 
 def penalised_fit(
@@ -94,7 +65,12 @@ def penalised_fit(
     coefficients[sloped] = slope
     strength[sloped] = np.abs(slope) / np.where(spread > 0.0, spread, np.inf)
     coefficients[constant] = level - shift @ slope
-    return Fit(columns, coefficients, penalty, loo, strength)
+    root = np.zeros((len(columns), len(s) + 1))
+    root[sloped, : len(s)] = Vt.T * (shrink / s)
+    root[constant, : len(s)] = -shift @ root[sloped, : len(s)]
+    root[constant, len(s)] = 1.0 / np.sqrt(len(y))
+    noise = noise_level(residuals[best], float(free[best].sum()))
+    return Fit(columns, coefficients, penalty, loo, strength, noise * root)
 
 
 def trimmed_fit(
@@ -215,6 +191,11 @@ def _path_predictions(
         spread = np.sqrt((vectors**2 * (eigenvalues / damped**2)).sum(axis=1))
         used = np.delete(used, int(np.argmin(np.abs(slope) / np.where(spread > 0.0, spread, np.inf))))
     return predictions
+
+
+def noise_level(residuals: NDArray[np.float64], free: float) -> float:
+    """Standard deviation of the noise from residuals of a fit that leaves `free` degrees of freedom; NaN if none."""
+    return float(np.sqrt(np.sum(residuals**2) / free)) if free > 1e-6 else np.nan
 
 
 def _standard_error(residuals: NDArray[np.float64]) -> float:

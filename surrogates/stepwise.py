@@ -3,10 +3,15 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from .selection import Fit, constant_column, folds, penalised_fit, supported
+from .fits import Fit
+from .paths import adaptive_lasso_order, lars_order
+from .selection import constant_column, folds, penalised_fit, supported
 
-SELECTIONS = ("backward", "forward")
+PATHS = ("forward", "lars", "adaptive_lasso")
 HEREDITIES = ("none", "weak", "strong")
+
+Entered = tuple[list[int], NDArray[np.float64]]
+"""Columns in the order in which they enter, and what each model on the way predicts, (n_asked, n_steps + 1)."""
 
 FULLEST = 0.6
 """At most so many terms a run: what follows explains the runs without predicting any other."""
@@ -21,12 +26,13 @@ def forward_fit(
     exponents: NDArray[np.int64],
     heredity: str = "none",
     floor: float = 0.0,
+    path: str = "forward",
 ) -> Fit:
-    """The smallest model on the forward path that predicts as well as the best one.
+    """The smallest model on a path of terms entering that predicts as well as the best one.
 
-    The term that lowers the residual most enters next. If a model on the path predicts its runs, each left
-    out, to `floor`, the smallest such is taken. Otherwise the number of terms is chosen by cross-validation
-    of the whole path, the choice of terms included, by the one-standard-error rule.
+    On the forward path the term that lowers the residual most enters next; others are in :mod:`.paths`. If a model on
+    the path predicts its runs, each left out, to `floor`, the smallest such is taken. Otherwise the number of terms is
+    chosen by cross-validation of the whole path, the choice of terms included, by the one-standard-error rule.
 
     Parameters
     ----------
@@ -40,6 +46,8 @@ def forward_fit(
         ``"strong"``: all of them.
     floor : float
         Leave-one-out error that counts as none.
+    path : str
+        One of :data:`PATHS`; heredity is kept by the forward one only.
 
     Notes
     -----
@@ -51,16 +59,26 @@ def forward_fit(
     parents = parents_of(exponents)
     constant = constant_column(matrix)
     start = 1 if constant >= 0 else 0
-    order, _ = forward_path(matrix, y, matrix[:0], parents, heredity, constant)
-    path = [penalised_fit(matrix, y, np.sort(order[:k]), (0.0,), floor) for k in range(start, len(order) + 1)]
-    explained = [fit for fit in path if fit.loo_rmse <= floor]
+
+    def entering(rows: NDArray[np.float64], values: NDArray[np.float64], asked: NDArray[np.float64]) -> Entered:
+        if path == "forward":
+            return forward_path(rows, values, asked, parents, heredity, constant)
+        order_by = lars_order if path == "lars" else adaptive_lasso_order
+        return _in_order(rows, values, asked, order_by(rows, values, max(1, int(FULLEST * len(values)))))
+
+    order, _ = entering(matrix, y, matrix[:0])
+    steps = [
+        penalised_fit(matrix, y, np.sort(order[:k]).astype(np.int64), (0.0,), floor)
+        for k in range(start, len(order) + 1)
+    ]
+    explained = [fit for fit in steps if fit.loo_rmse <= floor]
     if explained:
         return explained[0]
-    errors = np.zeros((len(y), len(path)))
+    errors = np.zeros((len(y), len(steps)))
     for out in folds(len(y)):
-        _, predicted = forward_path(matrix[~out], y[~out], matrix[out], parents, heredity, constant)
-        errors[out] = y[out, None] - as_long(predicted[:, start:], len(path))
-    return path[int(np.flatnonzero(supported(errors, floor))[0])]
+        _, predicted = entering(matrix[~out], y[~out], matrix[out])
+        errors[out] = y[out, None] - as_long(predicted[:, start:], len(steps))
+    return steps[int(np.flatnonzero(supported(errors, floor))[0])]
 
 
 def as_long(predicted: NDArray[np.float64], steps: int) -> NDArray[np.float64]:
@@ -119,6 +137,19 @@ def forward_path(
         entering = -1
 
 
+def _in_order(
+    matrix: NDArray[np.float64], y: NDArray[np.float64], asked: NDArray[np.float64], order: list[int]
+) -> Entered:
+    """As :func:`forward_path` returns, for columns that enter in a given order; dependent ones are left out."""
+    _, triangle = np.linalg.qr(matrix[:, order])
+    new = np.abs(np.diag(triangle)) > np.sqrt(INDEPENDENT) * np.linalg.norm(matrix[:, order[: len(triangle)]], axis=0)
+    order = [column for column, is_new in zip(order, new, strict=False) if is_new]
+    directions, triangle = np.linalg.qr(matrix[:, order])
+    shadows = np.linalg.solve(triangle.T, asked[:, order].T).T * (directions.T @ y)
+    predictions = np.hstack([np.zeros((len(asked), 1)), np.cumsum(shadows, axis=1)])
+    return order, predictions
+
+
 def parents_of(exponents: NDArray[np.int64]) -> list[list[int]]:
     """For each term, the candidates that it is a factor times; the constant is nobody's parent."""
     position = {tuple(row): i for i, row in enumerate(exponents.tolist())}
@@ -127,16 +158,6 @@ def parents_of(exponents: NDArray[np.int64]) -> list[list[int]]:
         lowered = [tuple(e - (k == j) for k, e in enumerate(row)) for j in range(len(row)) if row[j] > 0]
         found.append([position[parent] for parent in lowered if any(parent) and parent in position])
     return found
-
-
-def check_selection(selection: object, heredity: object) -> None:
-    """``ValueError`` if there is no such selection or heredity, or they do not go together."""
-    if selection not in SELECTIONS:
-        raise ValueError(f"selection must be one of {', '.join(SELECTIONS)}, got {selection!r}")
-    if heredity not in HEREDITIES:
-        raise ValueError(f"heredity must be one of {', '.join(HEREDITIES)}, got {heredity!r}")
-    if selection == "backward" and heredity != "none":
-        raise ValueError(f"heredity {heredity!r} needs selection 'forward'")
 
 
 def _eligible(order: list[int], parents: list[list[int]], heredity: str, p: int) -> NDArray[np.bool_]:

@@ -1,12 +1,14 @@
 """Validation: a surrogate's errors on runs it has not seen."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from experiments.runs import Response, Runs
+
+from .intervals import Interval, calibrated
 
 if TYPE_CHECKING:
     from .model import Surrogate
@@ -34,6 +36,17 @@ class ResponseError:
         Root mean square error (Eq. 2.8), SI.
     worst_run : int
         Row of the largest error.
+    relative_rmse : float, optional
+        ``rmse`` over the same denominator; None in models from before it was stored, like the next.
+    q2 : float, optional
+        Predictivity coefficient Q² = 1 − Σ(error²)/Σ((truth − mean truth)²) over these runs (Marrel, Iooss, Van Dorpe
+        & Volkova 2008, Comput. Stat. Data Anal. 52, 4731–4744): 1 is exact, 0 no better than their mean, no bound
+        below. Where the response does not move, zero stands in for the mean; −∞ if there the truth is
+        zero and the error is not.
+    worst_point : tuple of float
+        Settings of the run with the largest error, one per factor in its unit; empty if not known.
+    intervals : tuple of Interval
+        Prediction intervals from the residuals, by level; empty if there are too few runs.
     """
 
     response: str
@@ -43,14 +56,23 @@ class ResponseError:
     max_relative: float
     rmse: float
     worst_run: int
+    relative_rmse: float | None = None
+    q2: float | None = None
+    worst_point: tuple[float, ...] = ()
+    intervals: tuple[Interval, ...] = ()
 
 
 def compare(
-    responses: tuple[Response, ...], truth: ArrayLike, predicted: ArrayLike, resolution: float = 0.0
+    responses: tuple[Response, ...],
+    truth: ArrayLike,
+    predicted: ArrayLike,
+    resolution: float = 0.0,
+    settings: ArrayLike | None = None,
 ) -> tuple[ResponseError, ...]:
     """Errors of `predicted` against `truth`, both (n_runs, n_responses) in SI, one entry per response.
 
-    A response whose range is below `resolution` times its largest absolute value does not move.
+    A response whose range is below `resolution` times its largest absolute value does not move. `settings`
+    (n_runs, n_factors), in the factors' units, say where the largest errors lie.
 
     Raises
     ------
@@ -62,21 +84,59 @@ def compare(
         raise ValueError(f"truth {truth.shape} and prediction {predicted.shape} must have one column per response")
     if not len(truth):
         raise ValueError("validation needs at least one run")
-    size = np.abs(predicted - truth)
-    found = []
-    for j, response in enumerate(responses):
-        worst = int(np.argmax(size[:, j]))
-        spread = float(np.ptp(truth[:, j]))
-        largest = float(size[worst, j])
-        size_of_truth = float(np.abs(truth[:, j]).max())
-        measure = spread if spread > resolution * size_of_truth else size_of_truth
-        relative = largest / measure if measure > 0.0 else (0.0 if largest == 0.0 else np.inf)
-        rmse = float(np.sqrt(np.mean(size[:, j] ** 2)))
-        found.append(ResponseError(response.name, len(truth), largest, spread, float(relative), rmse, worst))
-    return tuple(found)
+    found = [_compared(r, truth[:, j], predicted[:, j], resolution) for j, r in enumerate(responses)]
+    if settings is None:
+        return tuple(found)
+    points = np.asarray(settings, dtype=np.float64)
+    if points.ndim != 2 or len(points) != len(truth):
+        raise ValueError(f"settings must have one row for each of {len(truth)} runs; got shape {points.shape}")
+    return tuple(replace(e, worst_point=tuple(points[e.worst_run].tolist())) for e in found)
 
 
 def errors(model: "Surrogate", runs: Runs, resolution: float = 0.0) -> tuple[ResponseError, ...]:
-    """Errors of `model` on the runs that have an answer; `worst_run` counts rows of ``runs.completed()``."""
+    """Errors of `model` on the runs that have an answer, with prediction intervals where there are runs enough.
+
+    `worst_run` counts rows of ``runs.completed()``. The intervals hold for runs drawn like these, which must not
+    have been used in the fit.
+    """
     done = runs.completed()
-    return compare(model.responses, done.values, model.predict(done.design.physical), resolution)
+    settings = done.design.physical
+    predicted = model.predict(settings)
+    found = compare(model.responses, done.values, predicted, resolution, settings)
+    return tuple(
+        replace(error, intervals=calibrated(residuals))
+        for error, residuals in zip(found, (done.values - predicted).T, strict=True)
+    )
+
+
+def _compared(
+    response: Response, truth: NDArray[np.float64], predicted: NDArray[np.float64], resolution: float
+) -> ResponseError:
+    size = np.abs(predicted - truth)
+    worst = int(np.argmax(size))
+    largest, spread, size_of_truth = float(size[worst]), float(np.ptp(truth)), float(np.abs(truth).max())
+    moves = spread > resolution * size_of_truth
+    measure = spread if moves else size_of_truth
+    rmse = float(np.sqrt(np.mean(size**2)))
+    return ResponseError(
+        response.name,
+        len(truth),
+        largest,
+        spread,
+        _ratio(largest, measure),
+        rmse,
+        worst,
+        relative_rmse=_ratio(rmse, measure),
+        q2=_q2(size, truth - truth.mean() if moves else truth, measure),
+    )
+
+
+def _ratio(error: float, measure: float) -> float:
+    return error / measure if measure > 0.0 else (0.0 if error == 0.0 else np.inf)
+
+
+def _q2(size: NDArray[np.float64], deviation: NDArray[np.float64], measure: float) -> float:
+    """Sums of squares are taken of ratios to `measure`: squares of tiny responses underflow."""
+    if not measure > 0.0:
+        return 1.0 if not size.any() else -np.inf
+    return float(1.0 - np.sum((size / measure) ** 2) / np.sum((deviation / measure) ** 2))

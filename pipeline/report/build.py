@@ -9,7 +9,7 @@ from jinja2 import Environment, StrictUndefined
 from experiments.designs import METHODS
 
 from ..runner import Outcome
-from . import figures, views
+from . import commanded, figures, growing, validation, views
 
 _HERE = files("pipeline.report")
 
@@ -53,16 +53,20 @@ def _content(outcome: Outcome, provenance: Mapping[str, Any]) -> dict[str, Any]:
         "fill": views.fill(outcome),
         "design_figure": figures.design_figure(outcome),
         "terms": views.terms(outcome),
+        "candidates": growing.candidates(outcome),
+        "growth": growing.rounds(outcome),
         "map": views.linear_map(outcome),
         "coefficients": views.coefficients(outcome),
         "published": views.published(outcome),
-        "validation": views.error_rows(outcome, model.validation),
+        "validation": validation.error_rows(outcome, model.validation),
         "at_rounding": max(e.max_relative for e in model.validation) < 1e-12,
+        "intervals": validation.intervals(outcome),
         "validation_failures": outcome.validation_runs.failures(),
         "validation_figures": [figures.validation_figure(outcome, j) for j in n],
         "certificate": views.certificate(outcome),
+        "boxes": commanded.boxes(outcome),
         "trip": outcome.round_trip,
-        "trip_rows": views.error_rows(outcome, outcome.round_trip.errors if outcome.round_trip else ()),
+        "trip_rows": validation.error_rows(outcome, outcome.round_trip.errors if outcome.round_trip else ()),
         "obstacle": outcome.obstacle,
         "shapes": [label for label, _ in cases],
         "shape_figure": figures.shape_figure(cases[0][1]) if cases else "",

@@ -9,6 +9,8 @@ from experiments.designs import METHODS, level_discrepancy_squared
 from experiments.oracles import Shape
 from experiments.oracles.plots import exaggeration, is_planar, size
 from surrogates import Verdict, affine_inverse, affine_map
+from surrogates.candidates import AUTO
+from surrogates.links import LOG, logarithmic, unit_of
 
 from ..runner import Outcome
 
@@ -44,7 +46,9 @@ def headline(outcome: Outcome) -> list[dict[str, str]]:
     model, trip = outcome.model, outcome.round_trip
     worst = max(model.validation, key=lambda e: e.max_relative)
     used = sum(len(model.terms_of(j)) for j in range(len(model.responses)))
+    # Where the degree is chosen, the candidates differ from response to response.
     offered = len(outcome.study.candidates(len(outcome.kept))) * len(model.responses)
+    of_offered = "" if outcome.fit.degree == AUTO else f" of {offered} candidate"
     certificate = model.certificate
     verdict = str(certificate.verdict) if certificate else "none"
     if certificate and certificate.condition is not None:
@@ -72,8 +76,8 @@ def headline(outcome: Outcome) -> list[dict[str, str]]:
     return [
         {
             "label": "model",
-            "value": "linear" if model.is_affine else f"polynomial of degree {model.terms.degrees.max()}",
-            "note": f"{used} of {offered} candidate coefficients are supported by the data",
+            "value": "linear" if model.is_affine_map else f"polynomial of degree {model.terms.degrees.max()}",
+            "note": f"{used}{of_offered} coefficients are supported by the data",
         },
         {
             "label": "largest error",
@@ -145,7 +149,7 @@ def fill(outcome: Outcome) -> dict[str, Any]:
 def linear_map(outcome: Outcome) -> dict[str, Any] | None:
     """The map and its inverse with shown units, for an affine model."""
     model = outcome.model
-    if not model.is_affine:
+    if not model.is_affine_map:
         return None
     scale = np.array([r.shown_scale for r in model.responses])
     matrix, offset = affine_map(model)
@@ -159,14 +163,31 @@ def linear_map(outcome: Outcome) -> dict[str, Any] | None:
     }
 
 
-def coefficients(outcome: Outcome) -> list[dict[str, Any]]:
-    """Coefficients in coded units, shown units, one row per term."""
-    model = outcome.model
-    shown = model.coefficients * [r.shown_scale for r in model.responses]
-    return [
-        {"term": label, "cells": [number(v, 5) if v != 0.0 else "" for v in row]}
-        for label, row in zip(model.terms.labels, shown, strict=True)
+def coefficients(outcome: Outcome) -> dict[str, Any]:
+    """Coefficients by coded factors, one row per term, with standard errors where they are known.
+
+    In shown units; of a response that is given by its logarithm, those of the logarithm of its SI value.
+    """
+    model, heads = outcome.model, []
+    by_log = logarithmic(model.links)
+    for r, log in zip(model.responses, by_log, strict=True):
+        symbol, unit = ("", unit_of(LOG, r.symbol, r.unit)) if log else (r.symbol, r.shown_unit)
+        heads.append({"symbol": symbol, "unit": unit})
+    scale = np.where(by_log, 1.0, [r.shown_scale for r in model.responses])
+    unknown = np.full_like(model.coefficients, np.nan)
+    errors = unknown if model.standard_errors is None else model.standard_errors
+    rows = [
+        {"term": label, "cells": [_with_error(v, e) for v, e in zip(values, beside, strict=True)]}
+        for label, values, beside in zip(model.terms.labels, model.coefficients * scale, errors * scale, strict=True)
     ]
+    return {"heads": heads, "rows": rows, "has_errors": bool(np.isfinite(errors).any()), "has_logs": model.has_logs}
+
+
+def _with_error(value: float, error: float) -> str:
+    """``"1.5 ± 0.2"``; empty for a term that the response does not use."""
+    if value == 0.0:
+        return ""
+    return number(value, 5) + (f" ± {number(error, 2)}" if np.isfinite(error) else "")
 
 
 def terms(outcome: Outcome) -> list[str]:
@@ -216,22 +237,6 @@ def published(outcome: Outcome) -> dict[str, Any] | None:
         "worst": percent(float(np.abs(differences[~zero]).max(initial=0.0))),
         "leak": number(float(np.abs(differences[zero]).max(initial=0.0)), 2),
     }
-
-
-def error_rows(outcome: Outcome, errors: Any) -> list[dict[str, str]]:
-    """One row per response, in shown units."""
-    shown = {r.name: r for r in outcome.model.responses}
-    return [
-        {
-            "symbol": shown[e.response].symbol,
-            "unit": shown[e.response].shown_unit,
-            "max_abs": number(e.max_abs * shown[e.response].shown_scale, 3),
-            "range": number(e.range * shown[e.response].shown_scale, 4),
-            "relative": percent(e.max_relative),
-            "rmse": number(e.rmse * shown[e.response].shown_scale, 3),
-        }
-        for e in errors
-    ]
 
 
 def certificate(outcome: Outcome) -> dict[str, Any] | None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, Protocol, runtime_checkable
 
 from experiments.naming import check_name
 
-from ..artefact import SCHEMA
+from ..artefact import schema_of
 
 if TYPE_CHECKING:
     from ..model import Surrogate
@@ -94,7 +94,7 @@ def about(model: "Surrogate") -> list[str]:
         "",
         "Provenance:",
         *(provenance or ["  none recorded"]),
-        f"  schema: {SCHEMA}",
+        f"  schema: {schema_of(model)}",
     ]
     return [part for line in lines for part in _wrapped(line)]
 

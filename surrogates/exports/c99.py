@@ -12,9 +12,17 @@ from experiments.designs.base import check_count
 from experiments.settings import parameter
 
 from ..inversion import BOX_TOLERANCE, MAX_ITERATIONS, TARGET_TOLERANCE, affine_inverse, obstacle
+from ..links import LOG, unit_of
 from . import c99_text as text
 from .base import WIDTH, about, check_prefix, number, plain
-from .c99_inverse_text import AFFINE_JACOBIAN, AFFINE_SEARCH, INVERSE, POLYNOMIAL_JACOBIAN, POLYNOMIAL_SEARCH
+from .c99_inverse_text import (
+    AFFINE_JACOBIAN,
+    AFFINE_SEARCH,
+    INVERSE,
+    INVERSE_WITH_LOGARITHMS,
+    POLYNOMIAL_JACOBIAN,
+    POLYNOMIAL_SEARCH,
+)
 
 if TYPE_CHECKING:
     from ..model import Surrogate
@@ -32,10 +40,11 @@ Product = tuple[float, tuple[str, ...]]
 class C99:
     """Forward map, Jacobian, domain check and inverse in C99, also valid C++.
 
-    An affine model is inverted by one constant matrix. Any other by the Gauss–Newton steps of
+    An affine map is inverted by one constant matrix. Any other model by the Gauss–Newton steps of
     :func:`surrogates.inversion.invert` from the centre of the domain, a bounded number of them;
     unlike Python, the C does not search the domain's boundary where they fail, it refuses. Where
-    there is an :func:`surrogates.inversion.obstacle`, the code has no inverse and says why.
+    there is an :func:`surrogates.inversion.obstacle`, the code has no inverse and says why. Of a response that is
+    given by its logarithm, the functions take and give the response itself.
 
     Parameters
     ----------
@@ -61,17 +70,19 @@ class C99:
         check_prefix(prefix, frozenset(text.RESERVED.split()))
         _check_locals(model, prefix)
         names = {"p": prefix, "P": prefix.upper()}
-        body = _affine(model) if model.is_affine else _polynomial(model)
+        body = _affine(model) if model.is_affine_map else _polynomial(model)
         settings = {"steps": str(self.max_iterations), "still": number(STILL)}
         settings["rank"] = str(min(len(model.factors), len(model.responses)))
-        source = Template(_parts(model)).substitute(names, **_common(model), **body, **settings)
+        source = Template(_parts(model)).substitute(names, **_common(model), **body, **settings, **_logs(model, names))
         return {f"{prefix}.h": _header(model, names, settings), f"{prefix}.c": source}
 
 
 def _header(model: "Surrogate", names: dict[str, str], settings: dict[str, str]) -> str:
-    unique = model.is_affine and len(model.factors) <= len(model.responses) and affine_inverse(model).condition < np.inf
+    affine = model.is_affine_map
+    unique = affine and len(model.factors) <= len(model.responses) and affine_inverse(model).condition < np.inf
     several = "" if unique else text.SEVERAL_NOTE
-    note = Template(text.AFFINE_NOTE if model.is_affine else text.POLYNOMIAL_NOTE)
+    note = Template(text.AFFINE_NOTE if affine else text.POLYNOMIAL_NOTE)
+    logs = " and ".join(model.responses[j].name for j in _by_log(model))
     against = obstacle(model)
     example = text.EXAMPLE_WITHOUT_INVERSE if against else text.EXAMPLE_WITH_INVERSE
     inverse = Template(text.WITHOUT_INVERSE if against else text.WITH_INVERSE)
@@ -80,6 +91,7 @@ def _header(model: "Surrogate", names: dict[str, str], settings: dict[str, str])
         n=str(len(model.factors)),
         m=str(len(model.responses)),
         about="\n".join(f" * {line}".rstrip() for line in about(model)),
+        logarithms=Template(text.LOGARITHMS).substitute(names=logs) if logs else "",
         centre=", ".join(number(c) for c in model.factors.centre),
         factor_indices=_indices(f"{names['P']}_FACTOR", model.factors.names),
         response_indices=_indices(f"{names['P']}_RESPONSE", tuple(r.name for r in model.responses)),
@@ -89,16 +101,48 @@ def _header(model: "Surrogate", names: dict[str, str], settings: dict[str, str])
             obstacle=textwrap.indent(textwrap.fill(f"There is no inverse: {against}.", WIDTH), " * "),
             inverse_note=note.substitute(settings, several=several),
             accuracy=f"{TARGET_TOLERANCE:g}",
+            of_logarithms=f",\n * of {logs} in logarithms" if logs else "",
         ),
     )
 
 
 def _parts(model: "Surrogate") -> str:
     """Templates of the source: what only the inverse needs is left out with it."""
-    jacobian, search = (AFFINE_JACOBIAN, AFFINE_SEARCH) if model.is_affine else (POLYNOMIAL_JACOBIAN, POLYNOMIAL_SEARCH)
+    affine = model.is_affine_map
+    jacobian, search = (AFFINE_JACOBIAN, AFFINE_SEARCH) if affine else (POLYNOMIAL_JACOBIAN, POLYNOMIAL_SEARCH)
     if obstacle(model):
         return text.SOURCE + text.FORWARD + jacobian
-    return text.SOURCE + text.CHECK + text.FORWARD + jacobian + search + INVERSE
+    inverse = INVERSE_WITH_LOGARITHMS if model.has_logs else INVERSE
+    return text.SOURCE + text.CHECK + text.FORWARD + jacobian + search + inverse
+
+
+def _by_log(model: "Surrogate") -> list[int]:
+    """Positions of the responses that are given by their logarithm."""
+    return [j for j, link in enumerate(model.links) if link == LOG]
+
+
+def _logs(model: "Surrogate", names: dict[str, str]) -> dict[str, str]:
+    """What the border between the polynomials and the responses adds to the source; nothing without logarithms."""
+    logs = _by_log(model)
+    if not logs:
+        empty = dict.fromkeys(("exponentials", "values_here", "values_too", "chained", "logarithms"), "")
+        return {**empty, "values": "Responses", "value": "response"}
+    loop = f"\n    for (int j = 0; j < {names['P']}_N_FACTORS; ++j) {{"
+    rows = "".join(f"\n        jacobian[{j}][j] *= exp(value[{j}]);" for j in logs)
+    checks = [
+        f"    if (!(responses[{j}] > 0.0)) {{\n        return {names['P']}_UNREACHABLE;\n    }}\n"
+        f"    wanted[{j}] = log(responses[{j}]);"
+        for j in logs
+    ]
+    return {
+        "exponentials": "".join(f"\n        responses[{j}] = exp(responses[{j}]);" for j in logs),
+        "values_here": f"\n    double value[{names['P']}_N_RESPONSES];",
+        "values_too": f"\n    {names['p']}_evaluate(coded, value);",
+        "chained": f"{loop}{rows}\n    }}",
+        "logarithms": "\n".join(checks),
+        "values": "Responses, of some the logarithm,",
+        "value": "response (of some: d logarithm)",
+    }
 
 
 def _check_locals(model: "Surrogate", prefix: str) -> None:
@@ -125,7 +169,8 @@ def _common(model: "Surrogate") -> dict[str, str]:
         rows = [(c, row) for c, row in zip(model.coefficients[:, j], model.terms.exponents, strict=True) if c]
         used += [row for _, row in rows]
         terms = [(c, _product(model, row)) for c, row in rows]
-        sums.append(f"    /* {response.name} [{plain(response.unit)}] */\n{_sum(f'responses[{j}]', terms)}")
+        unit = unit_of(model.links[j], response.name, plain(response.unit))
+        sums.append(f"    /* {response.name} [{unit}] */\n{_sum(f'responses[{j}]', terms)}")
     return {
         "coding": "\n".join(coding),
         "polynomials": _powers(model, used) + "\n\n" + "\n".join(sums),

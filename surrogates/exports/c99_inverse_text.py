@@ -29,7 +29,7 @@ $inverse
 """
 
 POLYNOMIAL_JACOBIAN = """
-/* d response / d coded setting at coded settings. */
+/* d $value / d coded setting at coded settings. */
 static void ${p}_slope(const double coded[${P}_N_FACTORS],
     double slope[${P}_N_RESPONSES][${P}_N_FACTORS])
 {
@@ -40,18 +40,18 @@ int ${p}_jacobian(const double settings[${P}_N_FACTORS],
     double jacobian[${P}_N_RESPONSES][${P}_N_FACTORS])
 {
     static const double half[${P}_N_FACTORS] = {$half};
-    double coded[${P}_N_FACTORS];
+    double coded[${P}_N_FACTORS];$values_here
     const int status = ${p}_code(settings, coded);
 
     if (status == ${P}_NOT_FINITE) {
         return status;
     }
-    ${p}_slope(coded, jacobian);
+    ${p}_slope(coded, jacobian);$values_too
     for (int i = 0; i < ${P}_N_RESPONSES; ++i) {
         for (int j = 0; j < ${P}_N_FACTORS; ++j) {
             jacobian[i][j] /= half[j];
         }
-    }
+    }$chained
     return status;
 }
 """
@@ -157,6 +157,30 @@ int ${p}_inverse(const double responses[${P}_N_RESPONSES], double settings[${P}_
     double found[${P}_N_FACTORS] = {0.0};
     const int status = ${p}_search(responses, found);
 
+    if (status == ${P}_OK) {
+        for (int j = 0; j < ${P}_N_FACTORS; ++j) {
+            settings[j] = found[j];
+        }
+    }
+    return status;
+}
+"""
+
+INVERSE_WITH_LOGARITHMS = """
+int ${p}_inverse(const double responses[${P}_N_RESPONSES], double settings[${P}_N_FACTORS])
+{
+    double found[${P}_N_FACTORS] = {0.0};
+    double wanted[${P}_N_RESPONSES];
+    int status;
+
+    for (int i = 0; i < ${P}_N_RESPONSES; ++i) {
+        if (!isfinite(responses[i])) {
+            return ${P}_NOT_FINITE;
+        }
+        wanted[i] = responses[i];
+    }
+$logarithms
+    status = ${p}_search(wanted, found);
     if (status == ${P}_OK) {
         for (int j = 0; j < ${P}_N_FACTORS; ++j) {
             settings[j] = found[j];

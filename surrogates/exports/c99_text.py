@@ -7,7 +7,7 @@ HEADER = """\
 $about
  *
  * Settings are in the factors' units and responses in the units above; nothing is rescaled.
- *
+$logarithms *
  * Example:
  *
  *     double settings[${P}_N_FACTORS] = {$centre};
@@ -68,7 +68,7 @@ WITH_INVERSE = """\
  * Settings that give the responses.
 $inverse_note
  * OK means that the settings lie in the domain and that the model gives each response there to $accuracy
- * of the most it can change. With any other status the settings are left as they were.
+ * of the most it can change$of_logarithms. With any other status the settings are left as they were.
  */
 int ${p}_inverse(const double responses[${P}_N_RESPONSES], double settings[${P}_N_FACTORS]);
 """
@@ -93,6 +93,11 @@ AFFINE_NOTE = """\
 POLYNOMIAL_NOTE = """\
  * Iterative: at most $steps Gauss-Newton steps of least norm from the centre of the domain. Where they leave
  * the domain the target is refused, even if other settings inside would reach it."""
+
+LOGARITHMS = """\
+ * The polynomials give ln(response / unit) of $names: the exponential is taken here, with no correction of
+ * the mean, and the inverse takes logarithms. It refuses a target of theirs that is not positive.
+"""
 
 SEVERAL_NOTE = """ Where several settings do, those of least coded norm; if they lie
  * outside the domain the target is refused, even if others inside would reach it."""
@@ -142,7 +147,7 @@ $coding
     return status;
 }
 
-/* Responses at coded settings. */
+/* $values at coded settings. */
 static void ${p}_evaluate(const double coded[${P}_N_FACTORS], double responses[${P}_N_RESPONSES])
 {
 $polynomials
@@ -190,7 +195,7 @@ int ${p}_forward(const double settings[${P}_N_FACTORS], double responses[${P}_N_
     const int status = ${p}_code(settings, coded);
 
     if (status != ${P}_NOT_FINITE) {
-        ${p}_evaluate(coded, responses);
+        ${p}_evaluate(coded, responses);$exponentials
     }
     return status;
 }

@@ -77,11 +77,11 @@ BAD = [
     appended(
         "too few runs to select from",
         '[fit]\nselection = "forward"\n[fit.design]\nmethod = "random"\nn_runs = 8',
-        r"8 runs are too few for a forward selection in 4 factors; use n_runs = 9 or more",
+        r"8 runs are too few for a fit in 4 factors; use n_runs = 9 or more",
     ),
     appended("number for a switch", "[fit]\ntrim = 1", r"fit\.trim should be a boolean, got 1"),
     appended("text for a list", '[export]\ntargets = "c99"', r"export\.targets should be a list, got 'c99'"),
-    appended("date for a number", "[fit]\ndegree = 2020-01-01", r"fit\.degree should be a whole number, got"),
+    appended("date for a number", "[fit]\ndegree = 2020-01-01", r"fit\.degree should be a whole number or 'auto', got"),
     appended("true for a parameter", "[oracle.parameters]\nyoung = true", r"young must be a number, got True"),
     appended("text for a parameter", '[oracle.parameters]\nyoung = "x"', r"young must be a number, got 'x'"),
     appended(
@@ -94,8 +94,13 @@ BAD = [
     # Values out of bounds.
     prepended("negative seed", "seed = -1", r"seed should be greater than or equal to 0, got -1"),
     prepended("huge seed", f"seed = {2**63}", rf"seed should be less than or equal to {2**63 - 1}, got {2**63}"),
-    appended("degree 0", "[fit]\ndegree = 0", r"fit\.degree should be greater than or equal to 1, got 0"),
-    appended("degree 9", "[fit]\ndegree = 9", r"fit\.degree should be less than or equal to 5, got 9"),
+    appended("degree 0", "[fit]\ndegree = 0", r"fit\.degree should be greater than or equal to 1 or 'auto', got 0"),
+    appended("degree 13", "[fit]\ndegree = 13", r"fit\.degree should be less than or equal to 12 or 'auto', got 13"),
+    appended(
+        "evidence in another basis",
+        '[fit]\nselection = "evidence"\nbasis = "chebyshev"',
+        r"fit: selection 'evidence' needs basis 'legendre', got 'chebyshev'",
+    ),
     appended("alpha 1", "[screening]\nalpha = 1.0", r"screening\.alpha should be less than 1, got 1\.0"),
     appended(
         "one validation run", "[validation]\nn_runs = 1", r"validation\.n_runs should be greater than or equal to 2"
@@ -220,7 +225,7 @@ BAD = [
     overridden("--set without key", "=3", r"--set '=3' is not of the form dotted\.key=value"),
     overridden("--set with an empty part", "fit..degree=3", r"--set 'fit\.\.degree=3' is not of the form"),
     overridden("--set below a value", "name.first=3", r"--set 'name\.first=3': 'name' is a value, not a table"),
-    overridden("--set of a wrong type", "fit.degree=two", r"fit\.degree should be a whole number, got 'two'"),
+    overridden("--set of a wrong type", "fit.degree=two", r"fit\.degree should be a whole number or 'auto', got 'two'"),
     overridden("--set of nothing", "seed=", r"seed should be a whole number, got ''"),
     overridden("--set not text", "title=\udcff", r"title|--set"),
 ]

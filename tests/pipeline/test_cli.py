@@ -17,8 +17,10 @@ import pytest
 from pipeline import load_config
 from pipeline.cli import main
 from pipeline.config import parse_config
+from surrogates import dumps
 from tests.pipeline.bad_inputs import BAD, MINIMAL, Bad
 from tests.pipeline.cases import CONFIGS, SMALL, A, C, Counted, D, config_text, contents, reproducible
+from tests.surrogates.cases import folded, surrogate, underdetermined, unit_box
 
 SMOKE = str(CONFIGS / "smoke.toml")
 SET_SMALL = [word for override in SMALL for word in ("--set", override)]
@@ -386,7 +388,7 @@ class TestPredict:
         assert list(rows[0]) == [*HEADER.strip().split(","), "deflection[m]", "slope[rad]", "status"]
         told = np.array([[float(r["deflection[m]"]), float(r["slope[rad]"])] for r in rows])
         np.testing.assert_array_equal(told, smoke.model.predict(points))
-        assert {r["status"] for r in rows} == {"ok"}
+        assert {r["status"] for r in rows} == {"inside"}
         assert err == ""
 
     @pytest.mark.parametrize(
@@ -419,7 +421,7 @@ class TestPredict:
 
     def test_flags_rows_outside_the_domain(self, model, table, answered):
         out, err = answered("predict", model, table(HEADER + ROW + "0.06,0.01,0.001,1.0\n"))
-        assert [r["status"] for r in rows_of(out)] == ["ok", "outside"]
+        assert [r["status"] for r in rows_of(out)] == ["inside", "outside"]
         assert err == "flexdoce: 1 of 2 rows lie outside the model's domain; their status is 'outside'\n"
 
     def test_far_outside_is_flagged_and_no_warning_of_numpy(self, model, table, answered):
@@ -427,6 +429,43 @@ class TestPredict:
             warnings.simplefilter("error", RuntimeWarning)
             out, _ = answered("predict", model, table(HEADER + "1e300,0.01,0.001,1.0\n"))
         assert rows_of(out)[0]["status"] == "outside"
+
+    def test_says_what_lies_on_the_edge(self, smoke, model, table, answered):
+        low, high = ([getattr(f, end) for f in smoke.model.factors] for end in ("low", "high"))
+        centre = smoke.model.factors.centre.tolist()
+        rows = [low, high, [low[0], *centre[1:]], centre]
+        out, err = answered("predict", model, table(HEADER + "\n".join(",".join(map(repr, r)) for r in rows)))
+        assert [r["status"] for r in rows_of(out)] == ["edge", "edge", "edge", "inside"]
+        assert err == ""
+
+    def test_refuses_settings_outside_where_asked_to(self, model, table, tmp_path, refused, answered):
+        bad = table(HEADER + ROW + "0.06,0.01,0.001,1.0\n")
+        sentence = refused("predict", model, bad, "--outside", "refuse", "--out", tmp_path / "o")
+        assert "table.csv: 1 of 2 settings lie outside the domain: row 2: length = 0.06 m (allowed: 0." in sentence
+        assert not (tmp_path / "o").exists()
+        told, _ = answered("predict", model, bad, "--outside", "flag")
+        assert told == answered("predict", model, bad)[0]
+        good = table(HEADER + ROW)
+        assert answered("predict", model, good, "--outside", "refuse") == answered("predict", model, good)
+
+    def test_gives_intervals(self, smoke, model, table, answered):
+        """The study has 20 validation runs: enough for 0.9 alone."""
+        out, _ = answered("predict", model, table(HEADER + ROW + "0.06,0.01,0.001,1.0\n"), "--interval", "0.9")
+        inside, outside = rows_of(out)
+        responses = ["deflection[m]", "slope[rad]"]
+        ends = [f"{end}_{label}" for end in ("low", "high") for label in responses]
+        assert list(inside) == [*HEADER.strip().split(","), *responses, *ends, "status"]
+        low, high = smoke.model.interval([[0.05, 0.01, 0.001, 1.0]], 0.9)
+        assert [float(inside[e]) for e in ends] == [*low[0], *high[0]]
+        assert low[0, 0] < float(inside["deflection[m]"]) < high[0, 0]
+        assert [outside[e] for e in ends] == [""] * 4
+
+    def test_refuses_a_level_without_an_interval(self, model, table, refused):
+        for level, match in (("0.99", "that takes 197 validation runs or more, this model had 20"), ("90", "level 90")):
+            sentence = refused("predict", model, table(HEADER + ROW), "--interval", level)
+            assert match in sentence
+            assert "levels there are: 0.9" in sentence
+            assert str(model) in sentence
 
 
 BAD_TABLES = [
@@ -484,10 +523,67 @@ class TestInvert:
         assert err == ""
         rows = rows_of(out)
         names = list(hexflex.model.factors.labels)
-        assert list(rows[0]) == [*labels, *names, "status", *(f"nearest_{label}" for label in labels)]
+        counted = ["preimages", "complete"]
+        assert list(rows[0]) == [*labels, *names, "status", *counted, *(f"nearest_{label}" for label in labels)]
         settings = np.array([[float(r[n]) for n in names] for r in rows])
         np.testing.assert_allclose(settings, hexflex.validation_runs.design.physical[:5], rtol=0, atol=1e-9)
         assert {r["status"] for r in rows} == {"ok"}
+        assert {(r["preimages"], r["complete"]) for r in rows} == {("1", "True")}
+
+    def test_tells_of_several_preimages_and_lists_them_all(self, table, tmp_path, answered):
+        path = tmp_path / "model.json"
+        path.write_text(dumps(folded()), encoding="utf-8")
+        targets = table("r0\n0.005\n5\n-0.3\n")
+        out, err = answered("invert", path, targets)
+        assert [(r["status"], r["preimages"], r["complete"]) for r in rows_of(out)] == [
+            ("ok", "2", "False"), ("outside", "0", "False"), ("ok", "2", "False")
+        ]  # fmt: skip
+        several, refused = err.splitlines()
+        assert several == (
+            "flexdoce: 2 of 3 targets have several preimages; the settings given are one of them, --all lists them"
+        )
+        assert refused.startswith("flexdoce: 1 of 3 targets are out of reach and were refused")
+
+        out, err = answered("invert", path, targets, "--all")
+        rows = rows_of(out)
+        assert [(r["r0[m]"], r["status"], r["preimages"], r["complete"]) for r in rows] == [
+            *[("0.005", "ok", "2", "True")] * 2, ("5.0", "outside", "0", "True"), *[("-0.3", "ok", "2", "True")] * 2
+        ]  # fmt: skip
+        model = folded()
+        for row in rows:
+            if row["status"] == "ok":
+                assert float(row["nearest_r0[m]"]) == pytest.approx(float(row["r0[m]"]), abs=1e-12)
+                assert model.predict([[float(row["f[N]"])]])[0, 0] == pytest.approx(float(row["r0[m]"]), abs=1e-12)
+            else:
+                assert row["f[N]"] == ""
+        assert rows[0]["f[N]"] != rows[1]["f[N]"]
+        assert [line.split(";")[0] for line in err.splitlines()] == [
+            "flexdoce: 2 of 3 targets have several preimages, one row each",
+            "flexdoce: 1 of 3 targets are out of reach",
+        ]
+
+    def test_says_where_a_list_of_preimages_may_lack_some(self, table, tmp_path, answered):
+        path = tmp_path / "model.json"
+        fold = surrogate(unit_box(1), ["f0^2"], [[1.0]])
+        path.write_text(dumps(fold), encoding="utf-8")
+        out, err = answered("invert", path, table("r0\n0\n"), "--all")
+        (row,) = rows_of(out)
+        assert (row["status"], row["preimages"], row["complete"]) == ("ok", "1", "False")
+        assert err.startswith("flexdoce: 1 of 1 lists of preimages are not proven to be complete; the first: ")
+        assert "stay undecided: settings meet there, or nearly; there may be others" in err
+
+    @pytest.mark.parametrize("more", [[], ["--all"]])
+    def test_tells_of_a_continuum(self, more, table, tmp_path, answered):
+        path, model = tmp_path / "model.json", underdetermined()
+        path.write_text(dumps(model), encoding="utf-8")
+        middle = model.predict(model.factors.centre[None])[0]
+        out, err = answered("invert", path, table("r0,r1\n" + ",".join(map(repr, middle.tolist())) + "\n"), *more)
+        (row,) = rows_of(out)
+        assert (row["status"], row["preimages"], row["complete"]) == ("ok", "inf", "False")
+        assert err == (
+            "flexdoce: 1 of 1 targets have a continuum of preimages: there are more factors than responses that follow "
+            "independently, or one acts on none; one is given\n"
+        )
 
     def test_refuses_a_pose_out_of_reach_with_the_nearest(self, hexflex, linear, table, answered):
         names = [r.name for r in hexflex.model.responses]

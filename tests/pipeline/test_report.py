@@ -8,6 +8,7 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 import pipeline
@@ -15,6 +16,7 @@ from experiments.designs import level_discrepancy_squared
 from pipeline import InputError, Outcome, read_run
 from pipeline.cli import main
 from pipeline.report import report_html
+from pipeline.report.validation import error_rows
 from pipeline.report.views import number, percent
 from tests.pipeline.cases import SMALL, config_text
 
@@ -150,6 +152,54 @@ class TestContent:
                 assert shown[1] in text
                 assert number(error.rmse * response.shown_scale, 3) in text
                 assert f"{response.symbol} [{response.shown_unit}]" in text
+        for row in error_rows(outcome, outcome.model.validation):
+            cells = ("max_abs", "range", "relative", "rmse", "relative_rmse", "q2", "worst")
+            assert f"{row['symbol']} [{row['unit']}] {' '.join(row[c] for c in cells)}" in text
+
+    @pytest.mark.parametrize(("which", "levels"), [("smoke", 1), ("hexflex", 3)])
+    def test_has_the_intervals_with_the_coverage_measured(self, which, levels, pages, request):
+        model, text = request.getfixturevalue(which).model, pages[which].text
+        n = model.validation[0].n_runs
+        assert f"{n // 2} of the fresh runs set the half-widths h; measured is the share of the other {n // 2}" in text
+        for error, response in zip(model.validation, model.responses, strict=True):
+            assert len(error.intervals) == levels
+            cells = [(number(i.half_width * response.shown_scale, 3), percent(i.coverage)) for i in error.intervals]
+            row = " ".join(part for cell in cells for part in cell)
+            assert f"{response.symbol} [{response.shown_unit}] {row}" in text
+        assert ("An interval of 99 % takes 197 fresh runs or more." in text) == (levels < 3)
+
+    def test_says_where_the_largest_error_lies(self, smoke):
+        space = smoke.model.factors
+        low, high = (np.array([getattr(f, end) for f in space]) for end in ("low", "high"))
+        mixed = np.where([True, False, False, True], low, space.centre)
+        for point, words in (
+            (space.centre, "in the interior"),
+            (mixed, "near low length, low load"),
+            (high, "near high length, high width, high thickness, high load (a corner)"),
+            ((), "–"),
+        ):
+            errors = [replace(e, worst_point=tuple(point)) for e in smoke.model.validation]
+            assert [row["worst"] for row in error_rows(smoke, errors)] == [words] * 2
+
+    @pytest.mark.parametrize(
+        ("q2", "words"),
+        [(None, "–"), (1.0, "1"), (1.0 - 2.0**-20, "1 − 9.5·10⁻⁷"), (0.98765, "0.988"), (-3.0, "−3"), (-np.inf, "–")],
+    )
+    def test_says_what_is_missing_of_q2(self, q2, words, smoke):
+        row = error_rows(smoke, [replace(smoke.model.validation[0], q2=q2)])[0]
+        assert row["q2"] == words
+
+    def test_of_a_model_from_before_q2_and_intervals(self, smoke_copy):
+        file = smoke_copy / "model.json"
+        document = json.loads(file.read_text(encoding="utf-8"))
+        for error in document["validation"]:
+            for name in ("relative_rmse", "q2", "worst_point", "intervals"):
+                del error[name]
+        file.write_text(json.dumps(document), encoding="utf-8")
+        assert main(["report", str(smoke_copy)]) == 0
+        text = " ".join((smoke_copy / "report.html").read_text(encoding="utf-8").split())
+        assert "There are none: half of the fresh runs set the width" in text
+        assert text.count('<td>–</td><td>–</td><td class="text">–</td>') == 2
 
     @pytest.mark.parametrize("which", ["smoke", "hexflex"])
     def test_has_the_study(self, which, pages, request):
@@ -190,9 +240,13 @@ class TestContent:
         assert "Coefficients" in page.text
         assert "The map" not in page.text
         assert "Published against ours" not in page.text
-        shown = smoke.model.coefficients * [r.shown_scale for r in smoke.model.responses]
-        for label, row in zip(smoke.model.terms.labels, shown, strict=True):
-            cells = " ".join(number(v, 5) for v in row if v != 0.0)
+        scale = [r.shown_scale for r in smoke.model.responses]
+        shown, errors = smoke.model.coefficients * scale, smoke.model.standard_errors * scale
+        assert (errors[shown != 0.0] > 0.0).all()
+        for label, row, beside in zip(smoke.model.terms.labels, shown, errors, strict=True):
+            cells = " ".join(
+                f"{number(v, 5)} ± {number(e, 2)}" for v, e in zip(row, beside, strict=True) if v != 0.0
+            )  # fmt: skip
             assert f"{label} {cells}" in page.text
 
     def test_draws_the_mechanism(self, page):

@@ -79,7 +79,7 @@ class TestFolder:
             assert table(smoke.path / stage / "design.csv")[0] == coded + (dummies if stage == "screening" else [])
             assert table(smoke.path / stage / "runs.csv")[0] == [*factors, *responses, "status", "reason"]
         assert table(smoke.path / "inversion" / "targets.csv")[0] == [
-            *responses, *factors, "status", "nearest_deflection[m]", "nearest_slope[rad]",
+            *responses, *factors, "status", "preimages", "complete", "nearest_deflection[m]", "nearest_slope[rad]",
         ]  # fmt: skip
 
     def test_long_tables_carry_the_unit_in_a_column(self, smoke):
@@ -121,8 +121,14 @@ class TestFolder:
 
     def test_errors_round_trip_exactly(self, smoke):
         for name, errors in (("validation", smoke.model.validation), ("inversion", smoke.round_trip.errors)):
-            told = numbers(smoke.path / name / "errors.csv", ["max_abs", "range", "max_relative_to_range", "rmse"])
-            assert_array_equal(told, [[e.max_abs, e.range, e.max_relative, e.rmse] for e in errors])
+            columns = ["max_abs", "range", "max_relative_to_range", "rmse", "rmse_relative_to_range", "q2"]
+            told = numbers(smoke.path / name / "errors.csv", columns)
+            expected = [[e.max_abs, e.range, e.max_relative, e.rmse, e.relative_rmse, e.q2] for e in errors]
+            assert_array_equal(told, expected)
+        worst = numbers(smoke.path / "validation" / "errors.csv", [f"worst_{n}" for n in smoke.study.space.labels])
+        assert_array_equal(worst, [e.worst_point for e in smoke.model.validation])
+        told = numbers(smoke.path / "validation" / "errors.csv", ["half_width_0.9", "coverage_0.9"])
+        assert_array_equal(told, [[e.intervals[0].half_width, e.intervals[0].coverage] for e in smoke.model.validation])
 
     def test_errors_are_those_of_the_files(self, smoke):
         """From the CSVs and model.json alone, by the definitions: MAXABS, over the range, and RMSE."""
@@ -130,11 +136,12 @@ class TestFolder:
         runs = smoke.path / "validation" / "runs.csv"
         truth = numbers(runs, [r.label for r in model.responses])
         error = np.abs(model.predict(numbers(runs, list(model.factors.labels))) - truth)
-        told = numbers(smoke.path / "validation" / "errors.csv", ["max_abs", "max_relative_to_range", "rmse"])
+        told = numbers(smoke.path / "validation" / "errors.csv", ["max_abs", "max_relative_to_range", "rmse", "q2"])
         largest = error.max(axis=0)
         assert_allclose(told[:, 0], largest, rtol=1e-12)
         assert_allclose(told[:, 1], largest / (truth.max(axis=0) - truth.min(axis=0)), rtol=1e-12)
         assert_allclose(told[:, 2], np.sqrt((error**2).mean(axis=0)), rtol=1e-12)
+        assert_allclose(told[:, 3], 1.0 - (error**2).mean(axis=0) / truth.var(axis=0), rtol=1e-12)
 
     def test_model_json_is_the_outcomes_model(self, smoke):
         points = smoke.validation_runs.design.physical

@@ -13,6 +13,7 @@ from numpy.testing import assert_array_equal
 
 from experiments import Factor, FactorSpace, Response
 from surrogates import ResponseError, certify, dumps, load, loads
+from surrogates.intervals import Interval
 from surrogates.validation import compare
 from tests.surrogates.cases import ALL, constant, hexflex_like, points, quintic, surrogate, underdetermined
 
@@ -21,7 +22,12 @@ ROOT = Path(__file__).parents[2]
 
 def dressed(model):
     """The model as the pipeline leaves it: validated, certified, with provenance."""
-    errors = tuple(ResponseError(r.name, 50, 1e-9 / 3.0, 1e-6, 1e-3 / 3.0, 1e-10, 7) for r in model.responses)
+    point = tuple((model.factors.centre + 0.3 * model.factors.half_range).tolist())
+    intervals = Interval(0.9, 1e-9 / 7.0, 25, 0.88, 25), Interval(0.95, 2e-9 / 7.0, 25, 0.96, 25)
+    errors = tuple(
+        ResponseError(r.name, 50, 1e-9 / 3.0, 1e-6, 1e-3 / 3.0, 1e-10, 7, 1e-4 / 3.0, 1.0 - 1e-6, point, intervals)
+        for r in model.responses
+    )
     provenance = {"config": "study.toml", "seed": 7, "versions": {"numpy": "2.0"}, "warnings": ["a", "µ"], "none": None}
     return replace(model, validation=errors, certificate=certify(model), provenance=provenance)
 
@@ -66,6 +72,38 @@ def test_an_error_on_a_response_that_is_always_zero_survives():
     text = dumps(replace(model, validation=errors))
     json.loads(text, parse_constant=pytest.fail)
     assert loads(text).validation == errors
+
+
+def test_a_file_from_before_q2_and_intervals_is_read_and_comes_back_as_it_was():
+    """Schema flexdoce-model/1 as it was first written: seven entries an error."""
+    model = hexflex_like()
+    old = tuple(ResponseError(r.name, 50, 1e-9 / 3.0, 1e-6, 1e-3 / 3.0, 1e-10, 7) for r in model.responses)
+    document = json.loads(dumps(model)) | {
+        "validation": [
+            {
+                "response": e.response, "n_runs": 50, "max_abs": e.max_abs, "range": e.range,
+                "max_relative": e.max_relative, "rmse": e.rmse, "worst_run": 7,
+            }
+            for e in old
+        ]
+    }  # fmt: skip
+    text = json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+    again = loads(text)
+    assert again.validation == old
+    assert {(e.relative_rmse, e.q2, e.worst_point, e.intervals) for e in again.validation} == {(None, None, (), ())}
+    assert dumps(again) == text
+    with pytest.raises(
+        ValueError, match="response 'r0' has no intervals, as in models from before they were calibrated"
+    ):
+        replace(again, validation=tuple(replace(e, n_runs=1000) for e in old)).interval(points(model, 1), 0.9)
+
+
+def test_what_has_no_denominator_is_null_and_comes_back():
+    model = constant()
+    errors = compare(model.responses, [[3.0, 0.0]] * 2, [[3.0, 1e-15], [3.0, 0.0]])
+    assert (errors[1].relative_rmse, errors[1].q2) == (np.inf, -np.inf)
+    entry = json.loads(dumps(replace(model, validation=errors)))["validation"][1]
+    assert [entry[name] for name in ("max_relative", "relative_rmse", "q2")] == [None] * 3
 
 
 def test_the_text_is_json_that_a_person_can_read(tmp_path):
@@ -121,11 +159,11 @@ assert not any(sys.modules.get(name) for name in {blocked!r})
         ("", "not valid JSON"),
         ("{", "not valid JSON"),
         ("nonsense", "not valid JSON"),
-        ("[]", "expected schema 'flexdoce-model/1', found 'list'"),
-        ("3", "expected schema 'flexdoce-model/1', found 'int'"),
+        ("[]", "expected schema 'flexdoce-model/1' or 'flexdoce-model/2', found 'list'"),
+        ("3", "expected schema 'flexdoce-model/1' or 'flexdoce-model/2', found 'int'"),
         ("null", "found 'NoneType'"),
-        ("{}", "expected schema 'flexdoce-model/1', found None"),
-        ('{"schema": "flexdoce-model/2"}', "found 'flexdoce-model/2'"),
+        ("{}", "expected schema 'flexdoce-model/1' or 'flexdoce-model/2', found None"),
+        ('{"schema": "flexdoce-model/3"}', "found 'flexdoce-model/3'"),
         ('{"schema": ["flexdoce-model/1"]}', "expected schema"),
         ('{"schema": "flexdoce-model/1"}', "missing or of the wrong kind: 'factors'"),
         ('{"schema": "flexdoce-model/1", "x": NaN}', "not valid JSON: NaN is not a number"),
@@ -176,6 +214,21 @@ def changed(change):
         (lambda d: d["coefficients"]["r0"].__setitem__(0, "x"), "could not convert string|numbers"),
         (lambda d: d["coefficients"]["r0"].__setitem__(0, None), "finite|wrong kind|numbers"),
         (lambda d: d["coefficients"]["r0"].__setitem__(0, 10**400), "r0|wrong kind|finite"),
+        (lambda d: d["validation"][0]["worst_point"].pop(), "worst_point must be 6 finite numbers, .*; got 5"),
+        (lambda d: d["validation"][0].update(worst_point=3), "worst_point must be a list, got 3"),
+        (lambda d: d["validation"][0].update(intervals=3), "intervals must be a list, got 3"),
+        (lambda d: d["validation"][0].update(q2="good"), "validation: q2 must be a number, got 'good'"),
+        (
+            lambda d: d["validation"][0]["intervals"][0].update(level=90),
+            "level of an interval must lie between 0 and 1",
+        ),
+        (
+            lambda d: d["validation"][0]["intervals"][0].update(half_width=-1.0),
+            "half_width must be finite and at least",
+        ),
+        (lambda d: d["validation"][0]["intervals"][0].update(coverage=88), "coverage must be from 0 to 1, got 88"),
+        (lambda d: d["validation"][0]["intervals"][0].update(colour=1), "interval has no setting 'colour'"),
+        (lambda d: d["validation"][0]["intervals"][0].pop("n_check"), "interval needs the setting 'n_check'"),
         (lambda d: d["certificate"].update(verdict="proven"), "'proven' is not a valid Verdict"),
         (lambda d: d["certificate"].update(verdict=None), "not a valid Verdict"),
     ],

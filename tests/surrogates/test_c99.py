@@ -520,3 +520,76 @@ def test_registry():
 def test_registry_refusals(name, settings, message):
     with pytest.raises(ValueError, match=message):
         get(name, settings)
+
+
+# --- responses that are given by their logarithm ----------------------------------------------------------------------
+
+
+def logarithms() -> Surrogate:
+    """Three factors to three curved responses, the second and third by their logarithm."""
+    model = square_quadratic()
+    return replace(model, coefficients=model.coefficients * [1.0, 100.0, 1.0], links=("identity", "log", "log"))
+
+
+def affine_logarithms() -> Surrogate:
+    return replace(
+        surrogate(unit_box(2), ["1", "f0", "f1"], [[0.5, 1.0, -0.5], [-14.0, 0.2, 1.0]]), links=("log", "log")
+    )
+
+
+@pytest.fixture(scope="module", params=[logarithms, affine_logarithms], ids=["curved", "affine"])
+def logged(request, tmp_path_factory):
+    if COMPILER is None:
+        pytest.skip("NO C COMPILER: looked for gcc, cc and clang on PATH. The exported C was not compared.")
+    return request.param(), Compiled(tmp_path_factory.mktemp(request.param.__name__), request.param())
+
+
+def test_logarithms_agree_with_python(logged):
+    model, compiled = logged
+    settings = points(model, 200, reach=0.8)
+    for point, expected, slope in zip(settings, model.predict(settings), model.jacobian(settings), strict=True):
+        status, responses = compiled.forward(point)
+        assert status == OK
+        assert np.abs((responses - expected) / expected).max() <= 1e-12
+        status, jacobian = compiled.jacobian(point)
+        assert status == OK
+        assert np.abs((jacobian - slope) / np.abs(slope).max(axis=1, keepdims=True)).max() <= 1e-12
+        status, found = compiled.inverse(expected)
+        assert status == OK
+        assert np.abs((found - point) / model.factors.half_range).max() <= 1e-9
+
+
+def test_logarithms_refuse_what_has_none(logged):
+    model, compiled = logged
+    target = model.predict(model.factors.centre[None])[0]
+    for j, link in enumerate(model.links):
+        for value in (0.0, -0.0, -1.0, -1e300) if link == "log" else ():
+            wrong = target.copy()
+            wrong[j] = value
+            status, settings = compiled.inverse(wrong)
+            assert status == UNREACHABLE
+            assert (settings == 777.0).all()
+            assert model.invert(wrong[None]).status == ("outside",)
+        for value in (np.nan, np.inf, -np.inf):
+            wrong = target.copy()
+            wrong[j] = value
+            wrong[0] = value if j == 0 else -1.0
+            assert compiled.inverse(wrong)[0] == NOT_FINITE
+
+
+@needs_compiler
+def test_logarithms_compile_without_warnings_in_c_and_c_plus_plus(tmp_path):
+    write(tmp_path, logarithms())
+    compile_c(tmp_path, *FLAGS, *STRICTER, *C_ONLY, "-c", "model.c", "-o", "model.o")
+    if shutil.which("g++"):
+        compile_c(tmp_path, "-Wall", "-Wextra", "-Werror", "-x", "c++", "-c", "model.c", "-o", "x.o", compiler="g++")
+
+
+def test_logarithms_are_told_to_the_reader():
+    texts = get("c99").render(logarithms(), "model")
+    assert "The polynomials give ln(response / unit) of r1 and r2" in texts["model.h"]
+    assert "schema: flexdoce-model/2" in texts["model.h"]
+    assert "ln(r1 / m)" in texts["model.c"]
+    plain = get("c99").render(replace(logarithms(), links=()), "model")
+    assert not any(word in text for text in plain.values() for word in ("ln(", "log(", "exp("))
+    assert "schema: flexdoce-model/1" in plain["model.h"]

@@ -115,8 +115,8 @@ def test_units_of_the_jacobian_are_those_of_the_settings():
     ("settings", "shape", "message"),
     [
         ({"selection": "forward"}, (40, 6), r"shape \(40, 1, 6\) \(runs, responses, factors\); got \(40, 6\)"),
-        ({"selection": "backward"}, (40, 1, 6), "set selection='forward' and trim=True"),
-        ({"selection": "forward", "trim": False}, (40, 1, 6), "set selection='forward' and trim=True"),
+        ({"selection": "backward"}, (40, 1, 6), "set selection to .* 'evidence', and trim=True"),
+        ({"selection": "forward", "trim": False}, (40, 1, 6), "set selection to .* 'evidence', and trim=True"),
     ],
 )
 def test_refuses_a_jacobian_that_does_not_fit(settings, shape, message):

@@ -1,18 +1,24 @@
 """Inversion: reached targets are met, refused ones come with the nearest point of the box."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import minimize
 
-from surrogates import InversionStatus, affine_inverse, obstacle
+from surrogates import InversionStatus, affine_inverse, certify, obstacle
 from tests.surrogates.cases import (
     AFFINE,
     ALL,
     NONLINEAR,
     block_map,
+    box,
     cantilever_like,
     constant,
+    dead_parts,
+    dependent,
+    folded,
     hexflex_like,
     more_responses,
     overdetermined,
@@ -186,6 +192,98 @@ def test_an_inversion_converts_to_its_settings():
     answer = model.invert(model.predict(points(model, 3)))
     assert_array_equal(np.asarray(answer), answer.settings)
     assert_array_equal(answer.ok, [True] * 3)
+
+
+# --- how many settings ------------------------------------------------------------------------------------------------
+
+
+def complex_square():
+    """z², on a box that holds both roots of every number of modulus below one."""
+    return surrogate(unit_box(2), ["f0^2", "f1^2", "f0:f1"], [[1.0, -1.0, 0.0], [0.0, 0.0, 2.0]])
+
+
+def test_several_settings_are_counted_and_one_is_given():
+    answer = folded().invert([[0.005], [0.02], [-0.3]])
+    assert answer.status == ("ok", "outside", "ok")
+    assert_array_equal(answer.count, [2, 0, 2])
+    assert not answer.complete.any()
+    assert not answer.unique.any()
+    model = complex_square()
+    answer = model.invert(model.predict(points(model, 200, reach=0.9)))
+    assert answer.ok.all()
+    assert_array_equal(answer.count, 2)
+    assert not answer.complete.any()
+
+
+def test_a_double_root_is_counted_once():
+    model = complex_square()
+    assert_array_equal(model.invert([[0.0, 0.0]]).count, [1])
+    fold = surrogate(unit_box(1), ["f0^2", "f0"], [[1.0, 0.4]])  # lowest at −0.2
+    assert_array_equal(fold.invert([[-0.04], [-0.0399]]).count, [1, 2])
+    triple = surrogate(unit_box(1), ["f0^3"], [[1.0]])
+    assert_array_equal(triple.invert([[0.0]]).count, [1])
+
+
+def test_of_a_certified_model_there_is_one():
+    model = square_quadratic()
+    targets = np.vstack([model.predict(points(model, 50)), model.predict(points(model, 5, reach=9.0))])
+    before, after = (m.invert(targets) for m in (model, replace(model, certificate=certify(model))))
+    assert_array_equal(after.unique, after.ok)
+    assert_array_equal(after.count, after.ok.astype(int))
+    assert not before.complete.any()
+    assert_array_equal(before.count, after.count)
+    assert_array_equal(before.settings, after.settings)
+
+
+@pytest.mark.parametrize("name", AFFINE)
+def test_an_affine_model_is_decided_by_its_rank(name):
+    model = AFFINE[name]()
+    answer = model.invert(np.vstack([model.predict(points(model, 5, reach=0.5)), np.full(len(model.responses), 1e9)]))
+    full = name not in ("constant", "underdetermined")
+    assert_array_equal(answer.count, [1] * 5 + [0])
+    assert_array_equal(answer.complete, [full] * 6)
+    assert_array_equal(answer.continuum, [not full] * 5 + [False])
+
+
+def one_idle():
+    """Two responses along a curve in one factor; the other factor acts on neither."""
+    return surrogate(unit_box(2), ["f0", "f0^2"], [[1.0, 0.2], [0.3, 1.0]])
+
+
+@pytest.mark.parametrize("build", [dead_parts, dependent, underdetermined, cantilever_like, one_idle])
+def test_more_factors_than_independent_responses_give_a_continuum(build):
+    model = build()
+    answer = model.invert(model.predict(points(model, 20, reach=0.3)))
+    assert answer.ok.all()
+    assert answer.continuum.all()
+    assert_array_equal(answer.count, 1)
+    assert not answer.complete.any()
+
+
+def test_a_factor_that_was_added_makes_a_certified_model_ambiguous():
+    model = square_quadratic()
+    wider = replace(model, certificate=certify(model)).embed(
+        box(("z", 0.0, 1.0), *((f.name, f.low, f.high) for f in model.factors), unit="N")
+    )
+    answer = wider.invert(wider.predict(points(wider, 5)))
+    assert answer.ok.all()
+    assert answer.continuum.all()
+    assert not answer.unique.any()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_no_more_settings_are_counted_than_there_are(seed):
+    rng = np.random.default_rng(seed)
+    terms = ["1", "f0", "f1", "f0^2", "f0:f1", "f1^2", "f0^3", "f1^3"]
+    model = surrogate(unit_box(2), terms, rng.normal(size=(2, 8)))
+    targets = model.predict(points(model, 10, seed))
+    answer, listed = model.invert(targets), [model.preimages(t) for t in targets]
+    assert answer.ok.all()
+    assert all(one.complete for one in listed)
+    assert (answer.count <= [len(one) for one in listed]).all()
+    assert answer.count.max() > 1
+    for setting, one in zip(answer.settings, listed, strict=True):
+        assert np.abs(one.settings - setting).max(axis=1).min() < 1e-7
 
 
 # --- the closed form --------------------------------------------------------------------------------------------------

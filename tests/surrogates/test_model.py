@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from experiments import Factor, FactorSpace, Response, Terms
 from surrogates import Surrogate
+from surrogates.validation import compare
 from tests.surrogates.cases import ALL, box, constant, points, square_quadratic, surrogate, unit_box
 
 
@@ -135,6 +136,14 @@ def test_embedding_adds_factors_that_do_nothing():
     widened = np.column_stack([np.linspace(0.0, 9.0, 20), settings[:, ::-1]])
     assert_allclose(wide.predict(widened), model.predict(settings), rtol=1e-14)
     assert (wide.jacobian(widened)[:, :, 0] == 0.0).all()
+
+
+def test_embedding_keeps_the_errors_and_forgets_where_the_largest_lay():
+    model = square_quadratic()
+    errors = compare(model.responses, np.zeros((1, 3)), np.ones((1, 3)), settings=[[1.0, 0.0, 1e-3]])
+    wide = replace(model, validation=errors).embed(FactorSpace((Factor("z", "K", 0.0, 9.0), *model.factors)))
+    assert wide.validation == tuple(replace(e, worst_point=()) for e in errors)
+    assert errors[0].worst_point == (1.0, 0.0, 1e-3)
 
 
 def test_embedding_refuses_another_range():

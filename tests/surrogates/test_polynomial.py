@@ -20,6 +20,7 @@ from tests.surrogates.cases import box, points, surrogate, unit_box
     [
         PolynomialRegressor(),
         PolynomialRegressor(degree=1, penalty=0.0),
+        PolynomialRegressor(degree=2, selection="evidence"),
         PolynomialRegressor(degree=3, interactions=False, trim=False),
     ]
 )
@@ -154,7 +155,7 @@ def test_an_unfitted_estimator_does_not_predict():
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"degree": 0}, "degree must be a whole number of at least 1, got 0"),
+        ({"degree": 0}, "degree must be a whole number from 1 to 12 or 'auto', got 0"),
         ({"degree": 1.5}, "degree must be a whole number"),
         ({"degree": True}, "degree must be a whole number"),
         ({"degree": "2"}, "degree must be a whole number"),
