@@ -141,6 +141,15 @@ class RequireTable(Table):
     certified_inverse: bool = Field(default=False, description="whether the inverse must be certified")
 
 
+class CommandTable(Table):
+    """What a controller will ask for, where it is not all responses: they may outnumber the factors."""
+
+    responses: list[str] = Field(default=[], description="responses to command; all of them if empty")
+    given: list[str] = Field(
+        default=[], description="factors whose values are known whenever a target is, such as loads"
+    )
+
+
 class ExportTable(Table):
     """Code generated from the model."""
 
@@ -161,6 +170,7 @@ class Config(Table):
     fit: FitTable = FitTable()
     validation: ValidationTable = ValidationTable()
     require: RequireTable = RequireTable()
+    command: CommandTable = CommandTable()
     export: ExportTable = ExportTable()
 
 

@@ -27,6 +27,10 @@ from .study import STAGES, Study, resolve
 ROUNDS = "fit/rounds.csv"
 
 
+COMMAND = "command.json"
+"""The square model of a study that commands some responses, others and some factors being given."""
+
+
 @dataclass(frozen=True, eq=False)
 class Outcome:
     """A finished study: every noun, and where they lie.
@@ -49,6 +53,8 @@ class Outcome:
         Wall time by stage; empty for a folder that was read back.
     rounds : tuple of Round
         How the fit came about; more than one only where the config has runs to add.
+    commanded : Surrogate or None
+        The square model that the config asks for, if it does.
     """
 
     path: Path
@@ -63,6 +69,7 @@ class Outcome:
     shortfalls: tuple[str, ...]
     seconds: dict[str, float] = field(default_factory=dict)
     rounds: tuple[Round, ...] = ()
+    commanded: Surrogate | None = None
 
     @property
     def adequacy(self) -> Adequacy:
@@ -151,10 +158,11 @@ class _Runner:
                 trip = self._round_trip(model, validation_runs)
         with self._timed("export"):
             folder.write("model.json", dumps(model))
+            commanded = self._commanded(model)
             self._export()
         outcome = Outcome(
             folder.path, study, screening_runs, screening, kept, fit_runs, model, validation_runs, trip,
-            tuple(stages.shortfalls(study, model, grown.rounds)), self.seconds, grown.rounds,
+            tuple(stages.shortfalls(study, model, grown.rounds)), self.seconds, grown.rounds, commanded,
         )  # fmt: skip
         folder.write("provenance.json", provenance_json(started, datetime.now(UTC), self.seconds))
         with self._timed("report"):
@@ -220,6 +228,15 @@ class _Runner:
             self.folder.write("inversion/errors.csv", tables.errors_csv(trip.errors, model.responses))
         return trip
 
+    def _commanded(self, model: Surrogate) -> Surrogate | None:
+        """The square model that the config asks for, in a file of its own."""
+        square = stages.commanded(self.study, model)
+        if square is None:
+            self.folder.discard(COMMAND)
+        else:
+            self.folder.write(COMMAND, dumps(square))
+        return square
+
     def _export(self) -> None:
         """Generate every target from ``model.json`` as it lies in the folder, and from nothing else."""
         model = loads(self.folder.read("model.json"))
@@ -262,6 +279,7 @@ def read_run(path: str | Path) -> Outcome:
     return Outcome(
         folder.path, study, runs["screening"], screening, kept, runs["fit"], model, runs["validation"], trip,
         tuple(stages.shortfalls(study, model, rounds)), rounds=rounds,
+        commanded=stages.commanded(study, model),
     )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ import surrogates
 from experiments.designs import Design, Random, Uniform
 from experiments.runs import Runs
 from experiments.screening import Adequacy, NextDesign, Screening, screen
-from surrogates import Inversion, RoundTrip, Surrogate, Verdict, certify, errors, obstacle, round_trip
+from surrogates import Inversion, RoundTrip, Surrogate, Verdict, certify, commanding, errors, obstacle, round_trip
 from surrogates.candidates import BETTER
 from surrogates.links import NotPositive
 
@@ -180,6 +180,15 @@ def certified(study: Study, kept: tuple[str, ...], surrogate: Surrogate, fit: Fi
     if study.config.require.max_runs is not None:
         origin |= {"fit_degree": fit.degree, "fit_selection": fit.selection}
     return replace(surrogate, certificate=certify(surrogate), provenance=origin)
+
+
+def commanded(study: Study, surrogate: Surrogate) -> Surrogate | None:
+    """The square model that the config asks for, with its own certificate; None if it asks for none."""
+    wanted = study.config.command
+    if not wanted.responses and not wanted.given:
+        return None
+    square = commanding(surrogate, wanted.responses or [r.name for r in surrogate.responses], wanted.given)
+    return replace(square, certificate=certify(square), provenance=surrogate.provenance)
 
 
 def _slopes(study: Study, runs: Runs, columns: list[int]) -> Any:

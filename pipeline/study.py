@@ -15,7 +15,7 @@ from experiments.factors import FactorSpace
 from experiments.oracles import Oracle
 from experiments.screening import count_contrasts
 from experiments.terms import Terms
-from surrogates import Surrogate, exports
+from surrogates import Surrogate, commanding, exports
 from surrogates.candidates import AUTO
 from surrogates.choosing import TAUGHT, Choice, natural_basis
 from surrogates.stepwise import FULLEST
@@ -168,6 +168,7 @@ def resolve(config: Config) -> Study:
     _check_fill(study)
     _check_growth(study)
     _check_exports(study)
+    _check_command(study)
     return study
 
 
@@ -265,11 +266,23 @@ def check_levels(config: Config, levels: int) -> None:
         )
 
 
+def _blank(study: Study) -> Surrogate:
+    """A model of the study with nothing in it, to try what is asked of the real one before anything runs."""
+    terms = Terms.polynomial(study.space.names, 1)
+    return Surrogate(study.space, study.oracle.responses, terms, np.zeros((len(terms), len(study.oracle.responses))))
+
+
+def _check_command(study: Study) -> None:
+    """Refuse responses and given factors that make no square model."""
+    wanted = study.config.command
+    if wanted.responses or wanted.given:
+        responses = wanted.responses or [r.name for r in study.oracle.responses]
+        _checked("command", lambda: commanding(_blank(study), responses, wanted.given))
+
+
 def _check_exports(study: Study) -> None:
     """Refuse unknown targets, and a prefix that a target's language does not allow, before anything runs."""
-    terms = Terms.polynomial(study.space.names, 1)
-    nothing = np.zeros((len(terms), len(study.oracle.responses)))
-    blank = Surrogate(study.space, study.oracle.responses, terms, nothing)
+    blank = _blank(study)
     for name in study.config.export.targets:
         target = _checked("export.targets", lambda name=name: exports.get(name))
         _checked("export.prefix", lambda target=target: target.render(blank, study.export_prefix))

@@ -88,6 +88,6 @@ def _check(model: "Surrogate", names: Sequence[str], responses: Sequence[str], g
         raise ValueError(f"each response and each given factor must be named once; got {', '.join(wanted)}")
     if len(wanted) != len(model.factors):
         raise ValueError(
-            f"{len(responses)} responses are to be commanded by {len(model.factors) - len(given)} factors "
+            f"responses to command: {len(responses)}; factors to do it with: {len(model.factors) - len(given)} "
             f"({len(model.factors)} less {len(given)} given): make the numbers equal"
         )

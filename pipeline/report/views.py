@@ -8,7 +8,7 @@ import numpy as np
 from experiments.designs import METHODS, level_discrepancy_squared
 from experiments.oracles import Shape
 from experiments.oracles.plots import exaggeration, is_planar, size
-from surrogates import Verdict, affine_inverse, affine_map
+from surrogates import Surrogate, Verdict, affine_inverse, affine_map
 from surrogates.candidates import AUTO
 from surrogates.links import LOG, logarithmic, unit_of
 
@@ -239,9 +239,9 @@ def published(outcome: Outcome) -> dict[str, Any] | None:
     }
 
 
-def certificate(outcome: Outcome) -> dict[str, Any] | None:
-    """The certificate in words."""
-    found = outcome.model.certificate
+def certificate(model: Surrogate | None) -> dict[str, Any] | None:
+    """The certificate of a model in words."""
+    found = model.certificate if model else None
     if found is None:
         return None
     return {

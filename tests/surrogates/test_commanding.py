@@ -66,7 +66,7 @@ def test_nothing_given_selects_responses():
         (
             ["r0", "r1"],
             ["length"],
-            r"2 responses are to be commanded by 3 factors \(4 less 1 given\): make the numbers",
+            r"responses to command: 2; factors to do it with: 3 \(4 less 1 given\): make the numbers",
         ),
     ],
 )
