@@ -91,7 +91,7 @@ def test_the_report_and_a_folder_read_back_show_it(commanded):
     ("override", "message"),
     [
         ('command.responses=["slop"]', "command: unknown response 'slop'; did you mean 'slope'"),
-        ('command.given=["load"]', "command: responses to command: 1; factors to do it with: 3 .* make the numbers equal"),
+        ('command.given=["load"]', "command: responses to command: 1; factors .*: 3 .* make the numbers equal"),
         ('command.given=["lenght", "width", "load"]', "command: unknown factor 'lenght'"),
     ],
 )
