@@ -33,9 +33,6 @@ MOST_CONSIDERED = 50_000
 BETTER = 0.9
 """A larger set must lower the leave-one-out error to this part of what a smaller one has."""
 
-MARGIN = 0.0
-"""By so much a larger set must raise the log evidence."""
-
 
 Expected = Callable[[NDArray[np.int64]], NDArray[np.float64]]
 

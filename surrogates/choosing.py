@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from experiments.terms import Terms
 
 from .basis import as_monomials, basis_gradient, basis_matrix
-from .candidates import BETTER, MARGIN, MOST_TAUGHT, MOST_TERMS, Scope
+from .candidates import BETTER, MOST_TAUGHT, MOST_TERMS, Scope
 from .evidence import Scales
 from .evidence_fit import evidence_fit
 from .fits import Fit, root_mean_square
@@ -212,7 +212,7 @@ def _is_better(larger: Chosen, smaller: Chosen, taught: bool) -> bool:
     """
     if larger.scales is None or smaller.scales is None or taught:
         return larger.loo_rmse < BETTER * smaller.loo_rmse
-    return larger.scales.evidence > smaller.scales.evidence + MARGIN
+    return larger.scales.evidence > smaller.scales.evidence
 
 
 def _can_be_judged(choice: Choice, terms: Terms, n_runs: int) -> bool:
