@@ -9,6 +9,7 @@ import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from experiments.naming import suggestion
+from surrogates.candidates import HIGHEST
 
 from .errors import InputError
 
@@ -89,10 +90,10 @@ class FitTable(Table):
     """The polynomial and the design that it is fitted on."""
 
     design: FillDesign = FillDesign()
-    degree: Annotated[int, Field(ge=1, le=12)] | Literal["auto"] = Field(
+    degree: Annotated[int, Field(ge=1, le=HIGHEST)] | Literal["auto"] = Field(
         default=2, description="highest total degree of the candidate terms; auto: chosen for each response"
     )
-    highest_degree: int = Field(default=5, ge=1, le=12, description="up to which degree 'auto' looks")
+    highest_degree: int = Field(default=5, ge=1, le=HIGHEST, description="up to which degree 'auto' looks")
     interactions: bool = Field(default=True, description="whether products of different factors are candidates")
     trim: bool = Field(default=True, description="whether terms that the data do not support are removed")
     selection: Literal["backward", "forward", "lars", "adaptive_lasso", "evidence"] = Field(

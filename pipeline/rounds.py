@@ -4,9 +4,10 @@ import csv
 import io
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
-from math import ceil, isfinite, log, log10
 
 import numpy as np
+
+from surrogates.learning_curve import runs_for
 
 from .errors import InputError
 from .reading import Table
@@ -22,12 +23,6 @@ HEADER = (
     "round", "step", "runs", "degree", "selection", "loo_rmse_relative_to_range", "expected_max_relative_to_range",
     "max_relative_to_range", "then",
 )  # fmt: skip
-
-SLOWEST = -0.5
-"""Power of the runs with which an error must fall to be extrapolated: slower, and the answer is a guess."""
-
-FARTHEST = 10.0
-"""How many times the runs an extrapolation may ask for."""
 
 
 @dataclass(frozen=True)
@@ -126,26 +121,11 @@ def ending(rounds: Sequence[Round], most: int, required: float, highest: int) ->
 
 
 def runs_needed(rounds: Sequence[Round], required: float) -> int | None:
-    """About how many runs would do, rounded up to two digits; None where the rounds do not tell.
-
-    The leave-one-out error is taken to fall as a power of the runs, and the error on fresh runs with it: as over the
-    last rounds of all sizes, or as over the last two sizes where that is slower. It takes three sizes, a power that
-    falls well, and an answer not too far away.
-    """
+    """About how many runs would do, see :func:`.runs_for`; None where the rounds do not tell."""
     by_size = {one.runs: one.loo for one in rounds}
-    error, n = rounds[-1].error, rounds[-1].runs
-    if len(by_size) < 3 or error is None or not all(0.0 < loo < np.inf for loo in by_size.values()):
+    if rounds[-1].error is None:
         return None
-    sizes, errors = np.log(list(by_size)), np.log(list(by_size.values()))
-    power = max(float(np.polyfit(sizes[-k:], errors[-k:], 1)[0]) for k in (2, len(sizes)))
-    if not power <= SLOWEST or not isfinite(error) or not required < error:
-        return None
-    times = log(error / required) / -power
-    if times > log(FARTHEST):
-        return None
-    needed = n * np.exp(times)
-    digit = 10 ** max(0, int(log10(needed)) - 1)
-    return ceil(needed / digit - 1e-9) * digit
+    return runs_for(list(by_size), list(by_size.values()), rounds[-1].error, required)
 
 
 def _number(cell: str, origin: str) -> float:
