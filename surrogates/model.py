@@ -191,7 +191,8 @@ class Surrogate:
     def embed(self, space: FactorSpace) -> "Surrogate":
         """The same polynomial as a model of all factors of a larger `space`; those it adds have no terms.
 
-        Errors are kept, but not where the largest lay: the settings of the added factors are not known.
+        Errors are kept, but not where the largest lay: the settings of the added factors are not known. A certificate
+        is not: with a factor that does not act, many settings give one response.
 
         Raises
         ------
@@ -207,7 +208,8 @@ class Surrogate:
         exponents[:, columns] = np.reshape(self.terms.exponents, (len(self.terms), len(columns)))
         terms = Terms(space.names, tuple(map(tuple, exponents.tolist())))
         validation = tuple(replace(e, worst_point=()) for e in self.validation)
-        return replace(self, factors=space, terms=terms, validation=validation)
+        certificate = self.certificate if space.names == self.factors.names else None
+        return replace(self, factors=space, terms=terms, validation=validation, certificate=certificate)
 
     def predict_coded(self, coded: ArrayLike) -> NDArray[np.float64]:
         """Values in link units from coded settings, shape (n, n_responses): :meth:`predict` where no link is a log."""

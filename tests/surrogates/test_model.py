@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from experiments import Factor, FactorSpace, Response, Terms
-from surrogates import Surrogate
+from surrogates import Surrogate, Verdict, certify
 from surrogates.validation import compare
 from tests.surrogates.cases import ALL, box, constant, points, square_quadratic, surrogate, unit_box
 
@@ -144,6 +144,17 @@ def test_embedding_keeps_the_errors_and_forgets_where_the_largest_lay():
     wide = replace(model, validation=errors).embed(FactorSpace((Factor("z", "K", 0.0, 9.0), *model.factors)))
     assert wide.validation == tuple(replace(e, worst_point=()) for e in errors)
     assert errors[0].worst_point == (1.0, 0.0, 1e-3)
+
+
+def test_embedding_drops_a_certificate_that_no_longer_holds():
+    """Many settings of a factor that does not act give one response."""
+    model = square_quadratic()
+    model = replace(model, certificate=certify(model))
+    assert model.certificate.verdict is Verdict.CERTIFIED
+    assert model.embed(model.factors).certificate == model.certificate
+    wide = model.embed(FactorSpace((*model.factors, Factor("z", "K", 0.0, 9.0))))
+    assert wide.certificate is None
+    assert certify(wide).verdict is Verdict.REFUTED
 
 
 def test_embedding_refuses_another_range():
