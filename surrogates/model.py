@@ -70,7 +70,7 @@ class Surrogate:
     links: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        coefficients = np.array(self.coefficients, dtype=np.float64)
+        coefficients = np.array(self.coefficients, dtype=np.float64, order="C")  # sums in one order: bit for bit
         expected = (len(self.terms), len(self.responses))
         if coefficients.shape != expected:
             raise ValueError(f"coefficients must have shape {expected} (terms, responses); got {coefficients.shape}")

@@ -1,7 +1,6 @@
 """Code generated from a surrogate alone, one file a target: ``get("c99").render(model, "stage")``.
 
-A target is frozen settings and one pure method from a model to texts by file name; whoever calls it
-writes the files.
+A target is frozen settings and one pure method from a model to files by name; whoever calls it writes the files.
 """
 
 from collections.abc import Mapping
@@ -11,11 +10,11 @@ from experiments.naming import suggestion
 from experiments.settings import build
 
 from .base import Target
-from .c99 import C99
+from .c99 import C99, C99Float
 
-TARGETS: dict[str, type[Target]] = {cls.name: cls for cls in (C99,)}
+TARGETS: dict[str, type[Target]] = {cls.name: cls for cls in (C99, C99Float)}
 
-__all__ = ["C99", "TARGETS", "Target", "get"]
+__all__ = ["C99", "TARGETS", "C99Float", "Target", "get"]
 
 
 def get(name: str, settings: Mapping[str, Any] | None = None) -> Target:

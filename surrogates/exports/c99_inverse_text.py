@@ -1,81 +1,170 @@
-"""The fixed text of the C99 export's Jacobian and search for each kind of model, and the inverse that ends both."""
+"""The fixed text of the C99 export's inverse, one search for each kind of plan, and the function that ends all."""
 
-AFFINE_JACOBIAN = """
-int ${p}_jacobian(const double settings[${P}_N_FACTORS],
-    double jacobian[${P}_N_RESPONSES][${P}_N_FACTORS])
+CHECK = """
+/* Whether settings answer for the responses$in_link_units. If they do, rounding beyond the ranges is taken off. */
+static int ${p}_check(const $real responses[${P}_N_RESPONSES], $real settings[${P}_N_FACTORS])
 {
-    const int status = ${p}_inside(settings);
+    static const $real low[${P}_N_FACTORS] = {$low};
+    static const $real high[${P}_N_FACTORS] = {$high};
+    static const $real tolerance[${P}_N_RESPONSES] = {$tolerance};
+    $real coded[${P}_N_FACTORS];
+    $real reached[${P}_N_RESPONSES];
+    const int status = ${p}_code(settings, coded);
 
-    if (status == ${P}_NOT_FINITE) {
-        return status;
+    if (status != ${P}_OK) {
+        return ${P}_OUTSIDE_DOMAIN;
     }
-$slope
-    return status;
+    ${p}_value(coded, reached);
+    for (int i = 0; i < ${P}_N_RESPONSES; ++i) {
+        const $real miss = reached[i] - responses[i];
+        if (!(miss <= tolerance[i] && miss >= -tolerance[i])) {
+            return ${P}_UNREACHABLE;
+        }
+    }
+    for (int j = 0; j < ${P}_N_FACTORS; ++j) {
+        settings[j] = settings[j] < low[j] ? low[j] : settings[j] > high[j] ? high[j] : settings[j];
+    }
+    return ${P}_OK;
 }
 """
 
-AFFINE_SEARCH = """
-/* As the inverse, but writes what it tried whatever the status. */
-static int ${p}_search(const double responses[${P}_N_RESPONSES], double settings[${P}_N_FACTORS])
+CENTRE_STEP = """
+/* The step of constant slope from the centre of the domain to the responses$in_link_units, in coded units. */
+static void ${p}_first(const $real responses[${P}_N_RESPONSES], $real moves[${P}_N_FACTORS])
 {
-$moves    for (int i = 0; i < ${P}_N_RESPONSES; ++i) {
-        if (!isfinite(responses[i])) {
-            return ${P}_NOT_FINITE;
-        }
-    }
-$inverse
+$moves
+}
+"""
+
+CLOSED_SEARCH = """
+/* As the inverse, but writes what it tried whatever the status. */
+static int ${p}_search(const $real responses[${P}_N_RESPONSES], $real settings[${P}_N_FACTORS])
+{
+    $real coded[${P}_N_FACTORS];
+
+    ${p}_first(responses, coded);
+$decoding
     return ${p}_check(responses, settings);
 }
 """
 
-POLYNOMIAL_JACOBIAN = """
-/* d $value / d coded setting at coded settings. */
-static void ${p}_slope(const double coded[${P}_N_FACTORS],
-    double slope[${P}_N_RESPONSES][${P}_N_FACTORS])
+CONTRACTING_SEARCH = """
+/*
+ * What the constant slope's inverse makes of the responses' change from the centre, and its slope. The
+ * certificate says that this slope is near the identity everywhere in the domain.
+ */
+static void ${p}_moved(const $real coded[${P}_N_FACTORS], $real value[${P}_N_FACTORS],
+    $real slope[${P}_N_FACTORS][${P}_N_FACTORS])
 {
-$derivatives
+$moved
 }
 
-int ${p}_jacobian(const double settings[${P}_N_FACTORS],
-    double jacobian[${P}_N_RESPONSES][${P}_N_FACTORS])
+/* Overwrites miss with the step for which slope * step = miss. A slope near the identity needs no pivoting. */
+static void ${p}_solve($real slope[${P}_N_FACTORS][${P}_N_FACTORS], $real miss[${P}_N_FACTORS])
 {
-    static const double half[${P}_N_FACTORS] = {$half};
-    double coded[${P}_N_FACTORS];$values_here
-    const int status = ${p}_code(settings, coded);
+    for (int k = 0; k < ${P}_N_FACTORS; ++k) {
+        const $real inverse = $one / slope[k][k];
 
-    if (status == ${P}_NOT_FINITE) {
-        return status;
-    }
-    ${p}_slope(coded, jacobian);$values_too
-    for (int i = 0; i < ${P}_N_RESPONSES; ++i) {
-        for (int j = 0; j < ${P}_N_FACTORS; ++j) {
-            jacobian[i][j] /= half[j];
+        for (int i = k + 1; i < ${P}_N_FACTORS; ++i) {
+            const $real factor = slope[i][k] * inverse;
+
+            for (int j = k + 1; j < ${P}_N_FACTORS; ++j) {
+                slope[i][j] -= factor * slope[k][j];
+            }
+            miss[i] -= factor * miss[k];
         }
-    }$chained
-    return status;
+        slope[k][k] = inverse;
+    }
+    for (int k = ${P}_N_FACTORS - 1; k >= 0; --k) {
+        for (int j = k + 1; j < ${P}_N_FACTORS; ++j) {
+            miss[k] -= slope[k][j] * miss[j];
+        }
+        miss[k] *= slope[k][k];
+    }
+}
+
+/* As the inverse, but writes what it tried whatever the status. */
+static int ${p}_search(const $real responses[${P}_N_RESPONSES], $real settings[${P}_N_FACTORS])
+{
+    $real wanted[${P}_N_FACTORS];
+    $real coded[${P}_N_FACTORS];
+    $real step[${P}_N_FACTORS];
+    $real slope[${P}_N_FACTORS][${P}_N_FACTORS];
+    int moving = 1;
+    int status;
+
+    ${p}_first(responses, wanted);
+    for (int j = 0; j < ${P}_N_FACTORS; ++j) {
+        coded[j] = ${p}_within(wanted[j], $limit);
+    }
+    for (int k = 0; k < $steps && moving; ++k) {
+        ${p}_moved(coded, step, slope);
+        for (int j = 0; j < ${P}_N_FACTORS; ++j) {
+            step[j] = wanted[j] - step[j];
+        }
+        ${p}_solve(slope, step);
+        moving = 0;
+        for (int j = 0; j < ${P}_N_FACTORS; ++j) {
+            coded[j] = ${p}_within(coded[j] + step[j], $limit);
+            moving |= !(step[j] < $still && step[j] > -$still);
+        }
+    }$chords
+$decoding
+    status = ${p}_check(responses, settings);
+    return status == ${P}_OK || !moving ? status : ${P}_NOT_CONVERGED;
 }
 """
 
-POLYNOMIAL_SEARCH = """
+CHORDS = """
+    if (moving) {
+        /* Rare: the certificate promises no convergence of Newton's steps, but of these. */
+        for (int j = 0; j < ${P}_N_FACTORS; ++j) {
+            coded[j] = ${p}_within(wanted[j], $limit);
+        }
+        for (int k = 0; k < $count; ++k) {
+            ${p}_moved_to(coded, step);
+            for (int j = 0; j < ${P}_N_FACTORS; ++j) {
+                coded[j] = ${p}_within(coded[j] + (wanted[j] - step[j]), $limit);
+            }
+        }
+    }"""
+
+MOVED_TO = """
+/* What ${p}_moved gives, without the slope. */
+static void ${p}_moved_to(const $real coded[${P}_N_FACTORS], $real value[${P}_N_FACTORS])
+{
+$moved_to
+}
+"""
+
+WITHIN = """
+/* The value, moved into [-limit, limit]. */
+static $real ${p}_within($real value, $real limit)
+{
+    return value > limit ? limit : value > -limit ? value : -limit;
+}
+"""
+
+FREE_SEARCH = """
 /*
  * The shortest step with slope * step = miss, by Gram-Schmidt on the rows, the longest first.
  * Rows that depend on those before them are left out. Overwrites slope and miss.
  */
-static void ${p}_least_norm(double slope[${P}_N_RESPONSES][${P}_N_FACTORS],
-    double miss[${P}_N_RESPONSES], double step[${P}_N_FACTORS])
+static void ${p}_least_norm($real slope[${P}_N_RESPONSES][${P}_N_FACTORS],
+    $real miss[${P}_N_RESPONSES], $real step[${P}_N_FACTORS])
 {
     int done[${P}_N_RESPONSES] = {0};
-    double longest = 0.0;
+    $real longest = $zero;
 
     for (int j = 0; j < ${P}_N_FACTORS; ++j) {
-        step[j] = 0.0;
+        step[j] = $zero;
     }
     for (int k = 0; k < $rank; ++k) {
         int row = -1;
-        double square = 0.0;
+        $real square = $zero;
 
         for (int i = 0; i < ${P}_N_RESPONSES; ++i) {
-            double sum = 0.0;
+            $real sum = $zero;
             for (int j = 0; j < ${P}_N_FACTORS; ++j) {
                 sum += slope[i][j] * slope[i][j];
             }
@@ -85,7 +174,7 @@ static void ${p}_least_norm(double slope[${P}_N_RESPONSES][${P}_N_FACTORS],
             }
         }
         longest = k == 0 ? square : longest;
-        if (row < 0 || square <= 1e-24 * longest) {
+        if (row < 0 || square <= $dependent * longest) {
             return;
         }
         done[row] = 1;
@@ -93,7 +182,7 @@ static void ${p}_least_norm(double slope[${P}_N_RESPONSES][${P}_N_FACTORS],
             step[j] += miss[row] / square * slope[row][j];
         }
         for (int i = 0; i < ${P}_N_RESPONSES; ++i) {
-            double along = 0.0;
+            $real along = $zero;
             for (int j = 0; j < ${P}_N_FACTORS; ++j) {
                 along += slope[i][j] * slope[row][j] / square;
             }
@@ -108,79 +197,54 @@ static void ${p}_least_norm(double slope[${P}_N_RESPONSES][${P}_N_FACTORS],
 }
 
 /* As the inverse, but writes what it tried whatever the status. */
-static int ${p}_search(const double responses[${P}_N_RESPONSES], double settings[${P}_N_FACTORS])
+static int ${p}_search(const $real responses[${P}_N_RESPONSES], $real settings[${P}_N_FACTORS])
 {
-    static const double scale[${P}_N_RESPONSES] = {$scale};
-    double coded[${P}_N_FACTORS] = {0.0};
-    double miss[${P}_N_RESPONSES];
-    double slope[${P}_N_RESPONSES][${P}_N_FACTORS];
-    double step[${P}_N_FACTORS];
-    int converged = 0;
+    static const $real per_scale[${P}_N_RESPONSES] = {$per_scale};
+    $real coded[${P}_N_FACTORS];
+    $real miss[${P}_N_RESPONSES];
+    $real slope[${P}_N_RESPONSES][${P}_N_FACTORS];
+    $real step[${P}_N_FACTORS];
+    int moving = 1;
     int status;
 
-    for (int i = 0; i < ${P}_N_RESPONSES; ++i) {
-        if (!isfinite(responses[i])) {
-            return ${P}_NOT_FINITE;
-        }
+    /* The first step stays in the domain, the others near it: far outside the polynomials mean nothing. */
+    ${p}_first(responses, coded);
+    for (int j = 0; j < ${P}_N_FACTORS; ++j) {
+        coded[j] = ${p}_within(coded[j], $one);
     }
-    for (int k = 0; k < $steps && !converged; ++k) {
-        /* The first step stays in the domain, the others near it: far outside the polynomials mean nothing. */
-        const double limit = k == 0 ? 1.0 : 2.0;
-
-        ${p}_evaluate(coded, miss);
-        ${p}_slope(coded, slope);
+    for (int k = 0; k < $steps && moving; ++k) {
+        ${p}_gradient(coded, miss, slope);
         for (int i = 0; i < ${P}_N_RESPONSES; ++i) {
-            miss[i] = (responses[i] - miss[i]) / scale[i];
+            miss[i] = (responses[i] - miss[i]) * per_scale[i];
             for (int j = 0; j < ${P}_N_FACTORS; ++j) {
-                slope[i][j] /= scale[i];
+                slope[i][j] *= per_scale[i];
             }
         }
         ${p}_least_norm(slope, miss, step);
-        converged = 1;
+        moving = 0;
         for (int j = 0; j < ${P}_N_FACTORS; ++j) {
-            const double wanted = coded[j] + step[j];
-            coded[j] = wanted > limit ? limit : wanted > -limit ? wanted : -limit;
-            if (!(fabs(step[j]) < $still)) {
-                converged = 0;
-            }
+            coded[j] = ${p}_within(coded[j] + step[j], $limit);
+            moving |= !(step[j] < $still && step[j] > -$still);
         }
     }
 $decoding
     status = ${p}_check(responses, settings);
-    return status == ${P}_OK || converged ? status : ${P}_NOT_CONVERGED;
+    return status == ${P}_OK || !moving ? status : ${P}_NOT_CONVERGED;
 }
 """
 
 INVERSE = """
-int ${p}_inverse(const double responses[${P}_N_RESPONSES], double settings[${P}_N_FACTORS])
+int ${p}_inverse(const $real responses[${P}_N_RESPONSES], $real settings[${P}_N_FACTORS])
 {
-    double found[${P}_N_FACTORS] = {0.0};
-    const int status = ${p}_search(responses, found);
-
-    if (status == ${P}_OK) {
-        for (int j = 0; j < ${P}_N_FACTORS; ++j) {
-            settings[j] = found[j];
-        }
-    }
-    return status;
-}
-"""
-
-INVERSE_WITH_LOGARITHMS = """
-int ${p}_inverse(const double responses[${P}_N_RESPONSES], double settings[${P}_N_FACTORS])
-{
-    double found[${P}_N_FACTORS] = {0.0};
-    double wanted[${P}_N_RESPONSES];
+    $real found[${P}_N_FACTORS] = {$zero};$wanted_here
     int status;
 
     for (int i = 0; i < ${P}_N_RESPONSES; ++i) {
-        if (!isfinite(responses[i])) {
+        if (!${p}_finite(responses[i])) {
             return ${P}_NOT_FINITE;
-        }
-        wanted[i] = responses[i];
-    }
-$logarithms
-    status = ${p}_search(wanted, found);
+        }$wanted_too
+    }$logarithms
+    status = ${p}_search($wanted, found);
     if (status == ${P}_OK) {
         for (int j = 0; j < ${P}_N_FACTORS; ++j) {
             settings[j] = found[j];

@@ -296,14 +296,14 @@ def test_no_globals_and_no_calls_but_mathematics(tmp_path, name):
     listing = subprocess.run(["nm", "dev.o"], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
     symbols = [line.split()[-2:] for line in listing.splitlines()]
     public = {s for kind, s in symbols if kind == "T"}
-    words = {"forward", "jacobian", "inside"} | (set() if obstacle(ALL[name]()) else {"inverse"})
+    words = {"forward", "forward_jacobian", "jacobian", "inside"} | (set() if obstacle(ALL[name]()) else {"inverse"})
     assert public == {f"dev_{word}" for word in words}
     assert {kind for kind, _ in symbols} <= {"T", "t", "r", "U"}
-    assert {s for kind, s in symbols if kind == "U"} <= {"fabs", "memset", "_GLOBAL_OFFSET_TABLE_"}
+    assert {s for kind, s in symbols if kind == "U"} <= {"memset", "_GLOBAL_OFFSET_TABLE_"}
     source = (tmp_path / "dev.c").read_text()
-    assert re.findall(r"#include.*", source) == ['#include "dev.h"', "#include <math.h>"]
+    assert re.findall(r"#include.*", source) == ['#include "dev.h"', "#include <float.h>"]
     assert not re.search(r"\b(malloc|calloc|realloc|free|goto|printf|exit)\b", source)
-    assert not re.search(r"^static (?!int|void)", source, re.MULTILINE)
+    assert not re.search(r"^static (?!int|void|double dev_within|const )", source, re.MULTILINE)
     assert not re.search(r"^ +static (?!const )", source, re.MULTILINE)
 
 
@@ -333,8 +333,8 @@ def test_the_same_model_gives_the_same_text(name):
     first, again = (get("c99").render(ALL[name](), "dev") for _ in range(2))
     assert first == again
     assert first == get("c99").render(loads(dumps(ALL[name]())), "dev")
-    assert list(first) == ["dev.h", "dev.c"]
-    assert all(text.isascii() and text.endswith("}\n" if file == "dev.c" else "*/\n") for file, text in first.items())
+    assert list(first) == ["dev.h", "dev.c", "dev_selftest.c"]
+    assert all(text.isascii() and text.endswith("*/\n" if file == "dev.h" else "}\n") for file, text in first.items())
 
 
 def test_provenance_order_does_not_matter():
@@ -346,20 +346,12 @@ def test_provenance_order_does_not_matter():
 
 
 def test_zeros_are_left_out():
-    files = get("c99").render(AFFINE["block_map"](), "dev")
-    inverse = files["dev.c"].partition("int dev_search")[2]
-    row = inverse.partition("settings[0] = ")[2].partition(";")[0]
-    assert "d_r0" in row
-    assert "d_r1" in row
-    assert "d_r2" not in row
-    assert "d_r3" not in row
-
-
-def test_powers_are_multiplied_once_and_shared():
-    source = get("c99").render(quintic(), "dev")["dev.c"]
-    evaluate = source.partition("static void dev_evaluate")[2].partition("\n}\n")[0]
-    assert evaluate.count("x4_f * x_f") == 1
-    assert "pow(" not in source
+    source = get("c99").render(AFFINE["block_map"](), "dev")["dev.c"]
+    row = source.partition("static void dev_first")[2].partition("moves[0] = ")[2].partition(";")[0]
+    assert "d0" in row
+    assert "d1" in row
+    assert "d2" not in row
+    assert "d3" not in row
 
 
 def test_every_number_survives_the_text():
@@ -436,7 +428,7 @@ def test_text_of_the_model_cannot_become_code(tmp_path, text):
     write(tmp_path, hostile_model(text), "dev")
     compile_c(tmp_path, *FLAGS, *STRICTER, "-c", "dev.c")
     # After the compiler has taken the comments out, the code is that of the same model without the text.
-    bare = replace(hostile_model("m"), certificate=None, provenance={})
+    bare = replace(hostile_model("m"), provenance={})
     expected = get("c99").render(bare, "dev")
     for name in files:
         assert _code(files[name]) == _code(expected[name])
@@ -468,16 +460,6 @@ def test_a_prefix_of_endless_length_is_refused():
 
 
 @needs_compiler
-def test_a_prefix_that_meets_a_response_in_one_name_is_refused(tmp_path):
-    model = quintic()
-    model = replace(model, responses=(Response("check", "m"),))
-    with pytest.raises(ValueError, match="prefix 'd' is not allowed: with 'check' it makes one name for two things"):
-        get("c99").render(model, "d")
-    write(tmp_path, model, "d_")
-    compile_c(tmp_path, *FLAGS, "-c", "d_.c")
-
-
-@needs_compiler
 def test_factors_may_be_called_like_anything(tmp_path):
     names = ["coded", "responses", "status", "int", "x", "x2_x", "NAN", "isfinite", "fabs", "main", "j", "DEV_OK", "OK"]
     factors = box(*((name, -1.0, 1.0) for name in names))
@@ -501,7 +483,6 @@ def test_a_number_that_overflows_is_refused_not_written(size):
 
 
 def test_registry():
-    assert list(TARGETS) == ["c99"]
     assert get("c99") == C99()
     assert get("c99", {"max_iterations": 5}).max_iterations == 5
     assert all(isinstance(get(name), Target) and cls.name == name and cls.summary for name, cls in TARGETS.items())
@@ -511,7 +492,7 @@ def test_registry():
     ("name", "settings", "message"),
     [
         ("c98", {}, r"unknown export 'c98'; did you mean 'c99'\?"),
-        ("zzz", {}, r"unknown export 'zzz'; known are c99"),
+        ("zzz", {}, r"unknown export 'zzz'; known are .*c99"),
         ("c99", {"max_iteration": 3}, r"export 'c99' has no setting 'max_iteration'; did you mean 'max_iterations'\?"),
         ("c99", {"max_iterations": 0}, r"max_iterations of the C99 export must be a whole number of at least 1, got 0"),
         ("c99", {"max_iterations": 2.5}, r"export 'c99': max_iterations must be a whole number, got 2.5"),

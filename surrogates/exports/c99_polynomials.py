@@ -1,0 +1,168 @@
+"""C functions that evaluate several polynomials at coded settings, alone or with all their derivatives.
+
+Polynomials that use much the same terms share one nesting and are evaluated side by side: the inner loop runs over
+the polynomials, a compiler makes vector instructions of it, and rows of the table of coefficients are padded to a
+multiple of what a vector holds. Others are evaluated one after the other, each with no more than its own terms.
+"""
+
+import textwrap
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .base import WIDTH
+from .c99_print import Printer
+from .horner import Coefficient, Entry, Node, count, edges, gradient_of, nest, products_of, value_of, variable, variables_of
+
+WORTH = 2.0
+"""Side by side is chosen if it takes at most this many times the multiplications: vectors make up for more than that."""
+
+
+class Count(NamedTuple):
+    """Operations of one call."""
+
+    multiplications: int
+    additions: int
+
+
+@dataclass(frozen=True, eq=False)
+class Polynomials:
+    """Polynomials with what their code needs.
+
+    Parameters
+    ----------
+    exponents : tuple of tuple of int
+        One per term.
+    coefficients : ndarray, shape (n_terms, n_polynomials)
+    names : tuple of str
+        What each gives, for comments: plain text.
+    n_factors : int
+    padded : int
+        Polynomials in a row of the table, with those that are zero; 0 if they are evaluated one after the other.
+    nodes : tuple of Node
+        One nesting if shared, else one per polynomial.
+    """
+
+    exponents: tuple[tuple[int, ...], ...]
+    coefficients: NDArray[np.float64]
+    names: tuple[str, ...]
+    n_factors: int
+    padded: int
+    nodes: tuple[Node, ...]
+
+    @property
+    def n(self) -> int:
+        """How many there are."""
+        return self.coefficients.shape[1]
+
+    def count(self, slopes: bool) -> Count:
+        """Operations of one evaluation, padding included."""
+        times = plus = 0
+        for i, node in enumerate(self.nodes):
+            written = (gradient_of if slopes else value_of)(node, self.coefficient(i, ""))
+            one = count([*(s.products for s in written.statements), written.value, *written.slopes])
+            times, plus = times + one[0], plus + one[1]
+        repeated = self.padded or 1
+        products = count(p.products for p in products_of(self.nodes)) if slopes else (0, 0)
+        return Count(times * repeated + products[0], plus * repeated + products[1])
+
+    def coefficient(self, i: int, table: str) -> Callable[[int], Coefficient]:
+        """What the code writes for the coefficient of a row in the nesting at `i`."""
+        if self.padded:
+            return lambda row: Entry(table, row)
+        return lambda row: float(self.coefficients[row, i])
+
+
+def polynomials(
+    exponents: Sequence[tuple[int, ...]],
+    coefficients: NDArray[np.float64],
+    names: Sequence[str],
+    n_factors: int,
+    multiple: int,
+) -> Polynomials:
+    """The cheaper of the two ways; rows of a shared table are padded to a `multiple`."""
+    n = coefficients.shape[1]
+    separate = tuple(nest(exponents, np.flatnonzero(column).tolist(), n_factors) for column in coefficients.T)
+    shared = nest(exponents, np.flatnonzero(coefficients.any(axis=1)).tolist(), n_factors)
+    alone, together = sum(map(edges, separate)), n * edges(shared)
+    side_by_side = n > 1 and alone > 0 and together <= WORTH * alone
+    return Polynomials(
+        tuple(exponents),
+        coefficients,
+        tuple(names),
+        n_factors,
+        _padded(n, multiple) if side_by_side else 0,
+        (shared,) if side_by_side else separate,
+    )
+
+
+def _padded(n: int, multiple: int) -> int:
+    """`n` up to the next multiple, if that adds no more than a third."""
+    whole = -(-n // multiple) * multiple
+    return whole if 3 * whole <= 4 * n else n
+
+
+def table_text(which: Polynomials, name: str, c: Printer) -> str:
+    """The table of coefficients of polynomials side by side; nothing for others."""
+    if not which.padded:
+        return ""
+    rows = np.zeros((len(which.exponents), which.padded))
+    rows[:, : which.n] = which.coefficients
+    padding = "; zeros up to whole vectors" if which.padded > which.n else ""
+    told = textwrap.fill(
+        f"Coefficients: a row for each term; columns: {', '.join(which.names)}{padding}.",
+        WIDTH,
+        initial_indent=" * ",
+        subsequent_indent=" * ",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return (
+        f"\n/*\n{told}\n */\n"
+        f"static const {c.real} {name}[{len(rows)}][{which.padded}] = {{\n{c.table(rows)}\n}};\n"
+    )
+
+
+def body(which: Polynomials, table: str, c: Printer, slopes: bool) -> str:
+    """Statements that write ``value[i]``, and ``slope[i][j]`` if asked for, from ``coded[j]``."""
+    used = variables_of(which.nodes)
+    lines = [f"    const {c.real} {variable(k)} = coded[{k}];" for k in used] or ["    (void)coded; /* constant */"]
+    if slopes:
+        lines += [c.assignment(one, "    ") for one in products_of(which.nodes)]
+    if which.padded:
+        return "\n".join([*lines, *_side_by_side(which, table, c, slopes)])
+    return "\n".join([*lines, "", *_one_by_one(which, c, slopes)])
+
+
+def _one_by_one(which: Polynomials, c: Printer, slopes: bool) -> list[str]:
+    lines = []
+    for i, (node, name) in enumerate(zip(which.nodes, which.names, strict=True)):
+        written = (gradient_of if slopes else value_of)(node, which.coefficient(i, ""))
+        lines.append(f"    {{ /* {name} */")
+        lines += [c.assignment(one, " " * 8) for one in written.statements]
+        lines.append(f"        value[{i}] = {c.sum(written.value, ' ' * 12)};")
+        lines += [f"        slope[{i}][{j}] = {c.sum(s, ' ' * 12)};" for j, s in enumerate(written.slopes)]
+        lines.append("    }")
+    return lines
+
+
+def _side_by_side(which: Polynomials, table: str, c: Printer, slopes: bool) -> list[str]:
+    written = (gradient_of if slopes else value_of)(which.nodes[0], which.coefficient(0, table))
+    lines = [f"    {c.real} sum[{which.padded}];"]
+    if slopes:
+        lines.append(f"    {c.real} by[{which.n_factors}][{which.padded}];")
+    lines += ["", f"    for (int j = 0; j < {which.padded}; ++j) {{"]
+    lines += [c.assignment(one, " " * 8) for one in written.statements]
+    lines.append(f"        sum[j] = {c.sum(written.value, ' ' * 12)};")
+    lines += [f"        by[{k}][j] = {c.sum(s, ' ' * 12)};" for k, s in enumerate(written.slopes)]
+    lines += ["    }", f"    for (int i = 0; i < {which.n}; ++i) {{", "        value[i] = sum[i];"]
+    if slopes:
+        lines += [
+            f"        for (int k = 0; k < {which.n_factors}; ++k) {{",
+            "            slope[i][k] = by[k][i];",
+            "        }",
+        ]
+    return [*lines, "    }"]
