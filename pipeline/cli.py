@@ -68,15 +68,25 @@ def _parser() -> argparse.ArgumentParser:
 
     _add_tables(verb)
 
-    sub = verb("export", commands.export, "generate code from a model")
-    sub.add_argument("model", metavar="MODEL.json")
-    sub.add_argument("--to", required=True, metavar="NAME", help="export target; 'flexdoce list' names them")
-    sub.add_argument("--out", required=True, metavar="DIR", help="folder to write to")
-    sub.add_argument("--prefix", metavar="NAME", help="prefix of generated names (default: name of the study)")
-    sub.add_argument("--force", action="store_true", help="overwrite files that are there already")
-
+    _add_exports(verb)
     verb("list", commands.list_known, "list oracles, designs and export targets with their settings")
     return parser
+
+
+def _add_exports(verb: Callable[[str, object, str], argparse.ArgumentParser]) -> None:
+    """The commands of generated code: ``export`` and ``verify``."""
+    sub = verb("export", commands.export, "generate code from a model and verify it; without a model, list the targets")
+    sub.add_argument("model", metavar="MODEL.json", nargs="?")
+    sub.add_argument("--to", metavar="NAME", help="target, or several with commas between them, or all")
+    sub.add_argument("--out", metavar="DIR", help="folder to write to; of several targets, each in a folder of its own")
+    sub.add_argument("--prefix", metavar="NAME", help="prefix of generated names (default: name of the study)")
+    sub.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
+                     help="a setting of the target, such as max_iterations=20; repeatable")  # fmt: skip
+    sub.add_argument("--force", action="store_true", help="overwrite files that are there already")
+    sub.add_argument("--no-verify", action="store_false", dest="verify", help="only write")
+
+    sub = verb("verify", commands.verify, "verify generated code again: unchanged, from its model, the same numbers")
+    sub.add_argument("folder", metavar="FOLDER", help="folder of an export, of several, or of a run")
 
 
 def _add_tables(verb: Callable[[str, object, str], argparse.ArgumentParser]) -> None:

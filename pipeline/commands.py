@@ -2,18 +2,21 @@
 
 import sys
 from argparse import Namespace
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from experiments import designs, oracles, settings
 from surrogates import Inversion, Surrogate, exports, load, obstacle
 from surrogates.domain import outside_sentence
+from surrogates.exports.verification import Finding, Outcome
 from surrogates.preimages import Preimages
 
-from . import tables
-from .config import dump_config, load_config
-from .console import console, design_table, progress_bars, summary
+from . import exporting, tables
+from .config import assignments, dump_config, load_config
+from .console import console, design_table, print_findings, progress_bars, summary
 from .errors import InputError, RequirementNotMet
 from .reading import read_points
 from .store import RunFolder
@@ -135,24 +138,65 @@ def _warn_of_preimages(found: list[Preimages]) -> None:
 
 
 def export(arguments: Namespace) -> None:
-    """``flexdoce export``."""
+    """``flexdoce export``: without a model, the list of targets."""
+    if arguments.model is None:
+        console.print("[bold]flexdoce export MODEL.json --to NAME --out DIR[/bold], NAME one of these, or all:")
+        _print_known(exports.TARGETS)
+        return
+    if arguments.to is None or arguments.out is None:
+        raise InputError("an export needs --to NAME (flexdoce export lists the names) and --out DIR")
     model = _model(arguments.model)
+    names = list(exports.TARGETS) if arguments.to == "all" else arguments.to.split(",")
+    for name in names:
+        _target(name)
+    text = Path(arguments.model).read_text(encoding="utf-8")
     prefix = arguments.prefix or str(model.provenance.get("study", "model"))
+    settings = assignments(arguments.overrides)
+    if settings and len(names) > 1:
+        raise InputError("--set needs a single target: settings belong to one")
+    out, refused = Path(arguments.out), []
+    for name in names:
+        try:
+            files, notes = exporting.generate(text, name, prefix, settings)
+        except InputError as error:
+            if len(names) == 1:
+                raise
+            refused.append(f"{name}: {error}")
+            continue
+        folder = out if len(names) == 1 else out / name
+        for path in exporting.write(folder, files, arguments.force):
+            print(path)
+        for note in notes:
+            _warn(note)
+        if arguments.verify:
+            _report_findings(name, exporting.verified(folder))
+    if refused:
+        raise InputError("not exported: " + "; ".join(refused))
+
+
+def verify(arguments: Namespace) -> None:
+    """``flexdoce verify``."""
+    differing = []
+    for folder in exporting.folders(Path(arguments.folder)):
+        try:
+            _report_findings(str(folder), exporting.verified(folder))
+        except RequirementNotMet as error:
+            differing.append(str(error))
+    if differing:
+        raise RequirementNotMet("; ".join(differing))
+
+
+def _report_findings(where: str, findings: list[Finding]) -> None:
+    print_findings(where, findings)
+    if wrong := [f for f in findings if f.outcome is Outcome.DIFFERS]:
+        raise RequirementNotMet(f"{where} is not what its model says: {wrong[0].what}: {wrong[0].detail}")
+
+
+def _target(name: str) -> None:
     try:
-        texts = exports.get(arguments.to).render(model, prefix)
+        exports.get(name)
     except ValueError as error:
         raise InputError(str(error)) from None
-    out = Path(arguments.out)
-    there = [name for name in texts if (out / name).exists()]
-    if there and not arguments.force:
-        raise InputError(f"{out} already holds {', '.join(there)}; use --force to overwrite, or another --out")
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        for name, text in texts.items():
-            (out / name).write_text(text, encoding="utf-8", newline="\n")
-            print(out / name)
-    except OSError as error:
-        raise InputError(f"cannot write to {out}: {error.strerror}") from None
 
 
 def list_known(arguments: Namespace) -> None:
@@ -163,13 +207,17 @@ def list_known(arguments: Namespace) -> None:
         ("exports", exports.TARGETS),
     ):
         console.print(f"[bold]{title}[/bold]")
-        for name, cls in known.items():
-            console.print(f"  [cyan]{name}[/cyan]  {cls.summary}", soft_wrap=True)
-            for row in settings.describe(cls):
-                unit = f" {row['unit']}" if row["unit"] not in ("", "1") else ""
-                line = f"      {row['name']} = {row['default']}{unit}  {row['about']}"
-                console.print(line, style="dim", markup=False, soft_wrap=True)
+        _print_known(known)
     console.print("Factors and responses of an oracle: flexdoce plan with a config that names it.", style="dim")
+
+
+def _print_known(known: Mapping[str, Any]) -> None:
+    for name, cls in known.items():
+        console.print(f"  [cyan]{name}[/cyan]  {cls.summary}", soft_wrap=True)
+        for row in settings.describe(cls):
+            unit = f" {row['unit']}" if row["unit"] not in ("", "1") else ""
+            line = f"      {row['name']} = {row['default']}{unit}  {row['about']}"
+            console.print(line, style="dim", markup=False, soft_wrap=True)
 
 
 def _model(path: str) -> Surrogate:

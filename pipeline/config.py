@@ -156,6 +156,7 @@ class ExportTable(Table):
 
     targets: list[str] = Field(default=["c99"], description="export targets; flexdoce list names them")
     prefix: str | None = Field(default=None, description="prefix of generated names; the study's name if not given")
+    verify: bool = Field(default=True, description="run what was generated against the model, with the tools at hand")
 
 
 class Config(Table):
@@ -205,6 +206,14 @@ def parse_config(text: str, origin: str = "config", overrides: Sequence[str] = (
         return Config.model_validate(document)
     except ValidationError as error:
         raise InputError(f"{origin}: {_sentence(error)}") from None
+
+
+def assignments(overrides: Sequence[str]) -> dict[str, Any]:
+    """Settings from ``key=value`` texts; ``InputError`` if one has another form."""
+    document: dict[str, Any] = {}
+    for override in overrides:
+        _apply(document, override)
+    return document
 
 
 def dump_config(config: Config) -> str:

@@ -1,6 +1,6 @@
 """What a person sees in a terminal: progress bars, tables, the summary at the end."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
@@ -11,6 +11,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from rich.table import Table
 
 from experiments.designs import Design
+from surrogates.exports.verification import Finding
+from surrogates.exports.verification import Outcome as Verified
 
 from .executors import Progress as Told
 from .runner import Outcome
@@ -92,10 +94,21 @@ def summary(outcome: Outcome) -> None:
     seconds = np.sum(list(outcome.seconds.values()))
     console.print(f"Took {seconds:.1f} s.")
     places = {"Report": "report.html", "Model": "model.json"}
-    if outcome.study.config.export.targets:
-        places["Code"] = "exports"
     for what, name in places.items():
         console.print(f"{what + ':':<8}[bold]{escape(str(outcome.path / name))}[/bold]", soft_wrap=True)
+    for name, told in outcome.exported.items():
+        place = escape(str(outcome.path / "exports" / name))
+        console.print(f"{'Code:':<8}[bold]{place}[/bold]{escape(f' ({told})') if told else ''}", soft_wrap=True)
+
+
+def print_findings(where: str, findings: Sequence[Finding]) -> None:
+    """What the checks of one export found, a line each."""
+    colours = {Verified.AGREES: "green", Verified.DIFFERS: "bold red", Verified.NOT_CHECKED: "yellow"}
+    console.print(f"[bold]{escape(where)}[/bold]", soft_wrap=True)
+    for one in findings:
+        detail = f"  [dim]{escape(one.detail)}[/dim]" if one.detail else ""
+        colour = colours[one.outcome]
+        console.print(f"  [{colour}]{one.outcome:<11}[/] {escape(one.what)}{detail}", soft_wrap=True)
 
 
 def _rounds(outcome: Outcome) -> None:

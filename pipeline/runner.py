@@ -10,9 +10,10 @@ from pathlib import Path
 from experiments.designs import Design, Random
 from experiments.runs import Runs
 from experiments.screening import Adequacy, Screening
-from surrogates import RoundTrip, Surrogate, dumps, exports, loads, obstacle
+from surrogates import RoundTrip, Surrogate, dumps, loads, obstacle
+from surrogates.exports.verification import Outcome as Verified
 
-from . import stages, tables
+from . import exporting, stages, tables
 from .config import FitTable, load_config
 from .errors import FlexdoceError, InputError
 from .executors import Progress, execute, silent
@@ -70,6 +71,7 @@ class Outcome:
     seconds: dict[str, float] = field(default_factory=dict)
     rounds: tuple[Round, ...] = ()
     commanded: Surrogate | None = None
+    exported: dict[str, str] = field(default_factory=dict)
 
     @property
     def adequacy(self) -> Adequacy:
@@ -159,10 +161,10 @@ class _Runner:
         with self._timed("export"):
             folder.write("model.json", dumps(model))
             commanded = self._commanded(model)
-            self._export()
+            exported, differing = self._export()
         outcome = Outcome(
             folder.path, study, screening_runs, screening, kept, fit_runs, model, validation_runs, trip,
-            tuple(stages.shortfalls(study, model, grown.rounds)), self.seconds, grown.rounds, commanded,
+            (*stages.shortfalls(study, model, grown.rounds), *differing), self.seconds, grown.rounds, commanded, exported,
         )  # fmt: skip
         folder.write("provenance.json", provenance_json(started, datetime.now(UTC), self.seconds))
         with self._timed("report"):
@@ -237,12 +239,18 @@ class _Runner:
             self.folder.write(COMMAND, dumps(square))
         return square
 
-    def _export(self) -> None:
-        """Generate every target from ``model.json`` as it lies in the folder, and from nothing else."""
-        model = loads(self.folder.read("model.json"))
+    def _export(self) -> tuple[dict[str, str], list[str]]:
+        """Generate every target from ``model.json`` as it lies in the folder; what the checks say, and what differs."""
+        text, told, differing = self.folder.read("model.json"), {}, []
         for name in self.study.config.export.targets:
-            for file, text in exports.get(name).render(model, self.study.export_prefix).items():
-                self.folder.write(f"exports/{name}/{file}", text)
+            place = self.folder.path / "exports" / name
+            files, notes = exporting.generate(text, name, self.study.export_prefix, {})
+            exporting.write(place, files, force=True)
+            if self.study.config.export.verify:
+                wrong = [f for f in exporting.verified(place) if f.outcome is Verified.DIFFERS]
+                differing += [f"the export {name} is not what the model says ({f.what}: {f.detail})" for f in wrong[:1]]
+            told[name] = "; ".join([*filter(None, [exporting.told(place)]), *notes])
+        return told, differing
 
     @contextmanager
     def _timed(self, stage: str) -> Iterator[None]:
@@ -280,6 +288,7 @@ def read_run(path: str | Path) -> Outcome:
         folder.path, study, runs["screening"], screening, kept, runs["fit"], model, runs["validation"], trip,
         tuple(stages.shortfalls(study, model, rounds)), rounds=rounds,
         commanded=stages.commanded(study, model),
+        exported={name: exporting.told(folder.path / "exports" / name) for name in config.export.targets},
     )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from experiments.naming import column_label
 from experiments.runs import Response, Runs
 from experiments.screening import Screening
 from surrogates import Inversion, InversionStatus, ResponseError, Surrogate
+from surrogates.exports.verification import Finding
 from surrogates.preimages import Preimages
 
 from .reading import CODED
@@ -67,6 +68,11 @@ def errors_csv(errors: Sequence[ResponseError], responses: Sequence[Response], s
     units = {r.name: r.unit for r in responses}
     levels = sorted({i.level for e in errors for i in e.intervals})
     return _csv(pd.DataFrame([_error_row(e, units[e.response], levels, space) for e in errors]))
+
+
+def findings_csv(findings: Sequence[Finding]) -> str:
+    """One row per check of an export."""
+    return _csv(pd.DataFrame([{"check": f.what, "outcome": str(f.outcome), "detail": f.detail} for f in findings]))
 
 
 def _error_row(error: ResponseError, unit: str, levels: list[float], space: FactorSpace | None) -> dict[str, Any]:

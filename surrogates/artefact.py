@@ -1,5 +1,6 @@
 """``model.json``: the contract with the controller, in plain JSON that a person can read."""
 
+import hashlib
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -56,7 +57,17 @@ def dumps(model: Surrogate) -> str:
         "certificate": asdict(model.certificate) if model.certificate else None,
         "provenance": dict(model.provenance),
     }
+    document["digest"] = digest_of(json.loads(json.dumps(document, allow_nan=False)))
     return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def digest_of(document: Mapping[str, Any]) -> str:
+    """SHA-256 of what a JSON document says, however it is laid out, its own ``digest`` aside.
+
+    It tells a changed number from an unchanged one; it is no signature: who can write the file can write the digest.
+    """
+    rest = {key: value for key, value in document.items() if key != "digest"}
+    return "sha256:" + hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()
 
 
 def loads(text: str) -> Surrogate:
@@ -65,7 +76,8 @@ def loads(text: str) -> Surrogate:
     Raises
     ------
     ValueError
-        If the text is not JSON, not this schema, or inconsistent; the sentence says where.
+        If the text is not JSON, not this schema, inconsistent, or changed since it was written; the sentence says
+        where. Models written before there was a digest have none to be held to.
     """
     try:
         document = json.loads(text, parse_constant=_refuse_constant)
@@ -81,9 +93,15 @@ def loads(text: str) -> Surrogate:
             f"not a model this version reads: expected schema {SCHEMA!r} or {SCHEMA_WITH_LINKS!r}, found {found!r}"
         )
     try:
-        return _surrogate(document)
+        model = _surrogate(document)
     except (KeyError, TypeError, AttributeError, OverflowError) as error:
         raise ValueError(f"a part of the model is missing or of the wrong kind: {error}") from None
+    if "digest" in document and document["digest"] != digest_of(document):
+        raise ValueError(
+            "the model was changed after it was written: what it says is not what its digest is of. Take the file that "
+            "flexdoce wrote, or run the study again"
+        )
+    return model
 
 
 def load(path: str | Path) -> Surrogate:

@@ -33,7 +33,7 @@ def test_example_resolves(path):
     assert len(study.screening_design) > len(study.space)
 
 
-SMALL = ("fit.degree=2", "fit.design.n_runs=42", "fit.design.budget=200", "validation.n_runs=20")
+SMALL = ("fit.degree=2", "fit.design.n_runs=42", "fit.design.budget=200", "validation.n_runs=20", "export.verify=false")
 
 
 def test_flexure_3rrr_runs_in_small(tmp_path):

@@ -75,6 +75,7 @@ def _content(outcome: Outcome, provenance: Mapping[str, Any]) -> dict[str, Any]:
         "viewer_data": views.viewer_data(cases),
         "provenance": provenance,
         "prefix": outcome.study.export_prefix,
+        "exported": outcome.exported,
     }
 
 

@@ -11,10 +11,14 @@ from experiments.settings import build
 
 from .base import Target
 from .c99 import C99, C99Float
+from .casadi_sx import CasADi
+from .fmi import FMI2, FMI3
+from .numpy_file import NumPyFile
+from .onnx_graph import ONNX
 
-TARGETS: dict[str, type[Target]] = {cls.name: cls for cls in (C99, C99Float)}
+TARGETS: dict[str, type[Target]] = {cls.name: cls for cls in (C99, C99Float, FMI2, FMI3, NumPyFile, CasADi, ONNX)}
 
-__all__ = ["C99", "TARGETS", "C99Float", "Target", "get"]
+__all__ = ["C99", "FMI2", "FMI3", "ONNX", "TARGETS", "C99Float", "CasADi", "NumPyFile", "Target", "get"]
 
 
 def get(name: str, settings: Mapping[str, Any] | None = None) -> Target:

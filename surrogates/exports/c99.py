@@ -36,14 +36,11 @@ class C99:
     ----------
     max_iterations : int
         Most Gauss–Newton steps where no certificate counts them: bounds the time that an inversion takes.
-    lanes : int
-        Numbers in one of the processor's vectors: rows of shared tables are padded to it where that adds no more than
-        a third. 1 pads nothing, for processors without vectors.
 
     Raises
     ------
     ValueError
-        If a setting is not a whole number of at least 1.
+        If `max_iterations` is not a whole number of at least 1.
     """
 
     name: ClassVar[str] = "c99"
@@ -51,11 +48,9 @@ class C99:
     precision: ClassVar[Precision] = DOUBLE
 
     max_iterations: int = parameter(MAX_ITERATIONS, "steps", "most Gauss-Newton steps of an inverse without certificate")
-    lanes: int = parameter(4, "numbers", "numbers in one of the processor's vectors; 1 if it has none")
 
     def __post_init__(self) -> None:
         check_count("max_iterations of the C99 export", self.max_iterations, 1)
-        check_count("lanes of the C99 export", self.lanes, 1)
 
     def prefix_of(self, prefix: str) -> str:
         """What begins every public name and the files' names, given the prefix of the export."""
@@ -65,7 +60,7 @@ class C99:
         """``<prefix>.h``, ``<prefix>.c`` and ``<prefix>_selftest.c``; see :class:`.Target`."""
         check_prefix(prefix, frozenset(text.RESERVED.split()))
         name = self.prefix_of(prefix)
-        parts = Parts(model, name, self.precision, self.max_iterations, self.lanes)
+        parts = Parts(model, name, self.precision, self.max_iterations)
         return {
             f"{name}.h": _header(parts),
             f"{name}.c": parts.source(),

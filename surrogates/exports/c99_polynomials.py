@@ -1,8 +1,8 @@
 """C functions that evaluate several polynomials at coded settings, alone or with all their derivatives.
 
 Polynomials that use much the same terms share one nesting and are evaluated side by side: the inner loop runs over
-the polynomials, a compiler makes vector instructions of it, and rows of the table of coefficients are padded to a
-multiple of what a vector holds. Others are evaluated one after the other, each with no more than its own terms.
+the polynomials, a compiler makes vector instructions of it, and where the processor has vectors the rows of the table
+of coefficients are padded to whole ones. Others are evaluated one after the other, each with no more than its own terms.
 """
 
 import textwrap
@@ -40,8 +40,8 @@ class Polynomials:
     names : tuple of str
         What each gives, for comments: plain text.
     n_factors : int
-    padded : int
-        Polynomials in a row of the table, with those that are zero; 0 if they are evaluated one after the other.
+    shared : bool
+        Whether they are evaluated side by side.
     nodes : tuple of Node
         One nesting if shared, else one per polynomial.
     """
@@ -50,7 +50,7 @@ class Polynomials:
     coefficients: NDArray[np.float64]
     names: tuple[str, ...]
     n_factors: int
-    padded: int
+    shared: bool
     nodes: tuple[Node, ...]
 
     @property
@@ -59,19 +59,19 @@ class Polynomials:
         return self.coefficients.shape[1]
 
     def count(self, slopes: bool) -> Count:
-        """Operations of one evaluation, padding included."""
+        """Operations of one evaluation, zeros that fill vectors aside."""
         times = plus = 0
         for i, node in enumerate(self.nodes):
             written = (gradient_of if slopes else value_of)(node, self.coefficient(i, ""))
             one = count([*(s.products for s in written.statements), written.value, *written.slopes])
             times, plus = times + one[0], plus + one[1]
-        repeated = self.padded or 1
+        repeated = self.n if self.shared else 1
         products = count(p.products for p in products_of(self.nodes)) if slopes else (0, 0)
         return Count(times * repeated + products[0], plus * repeated + products[1])
 
     def coefficient(self, i: int, table: str) -> Callable[[int], Coefficient]:
         """What the code writes for the coefficient of a row in the nesting at `i`."""
-        if self.padded:
+        if self.shared:
             return lambda row: Entry(table, row)
         return lambda row: float(self.coefficients[row, i])
 
@@ -81,9 +81,8 @@ def polynomials(
     coefficients: NDArray[np.float64],
     names: Sequence[str],
     n_factors: int,
-    multiple: int,
 ) -> Polynomials:
-    """The cheaper of the two ways; rows of a shared table are padded to a `multiple`."""
+    """The polynomials in the quicker of the two ways."""
     n = coefficients.shape[1]
     separate = tuple(nest(exponents, np.flatnonzero(column).tolist(), n_factors) for column in coefficients.T)
     shared = nest(exponents, np.flatnonzero(coefficients.any(axis=1)).tolist(), n_factors)
@@ -94,46 +93,54 @@ def polynomials(
         coefficients,
         tuple(names),
         n_factors,
-        _padded(n, multiple) if side_by_side else 0,
+        side_by_side,
         (shared,) if side_by_side else separate,
     )
 
 
-def _padded(n: int, multiple: int) -> int:
-    """`n` up to the next multiple, if that adds no more than a third."""
-    whole = -(-n // multiple) * multiple
-    return whole if 3 * whole <= 4 * n else n
+def columns_text(n: int, name: str, lanes: tuple[int, int]) -> str:
+    """Definition of the tables' columns: `n`, or whole vectors where that adds no more than a third.
+
+    `lanes` are the numbers in a vector of SSE2 or NEON, and of AVX.
+    """
+    widths = [whole if 3 * whole <= 4 * n else n for whole in (-(-n // k) * k for k in lanes)]
+    if set(widths) == {n}:
+        return f"\n#define {name} {n}\n"
+    return (
+        "\n/* Columns of the tables: zeros fill whole vectors where the processor has them. */\n"
+        f"#if defined(__AVX__)\n#define {name} {widths[1]}\n"
+        f"#elif defined(__SSE2__) || defined(__ARM_NEON)\n#define {name} {widths[0]}\n"
+        f"#else\n#define {name} {n}\n#endif\n"
+    )
 
 
-def table_text(which: Polynomials, name: str, c: Printer) -> str:
+def table_text(which: Polynomials, name: str, columns: str, c: Printer) -> str:
     """The table of coefficients of polynomials side by side; nothing for others."""
-    if not which.padded:
+    if not which.shared:
         return ""
-    rows = np.zeros((len(which.exponents), which.padded))
-    rows[:, : which.n] = which.coefficients
-    padding = "; zeros up to whole vectors" if which.padded > which.n else ""
     told = textwrap.fill(
-        f"Coefficients: a row for each term; columns: {', '.join(which.names)}{padding}.",
+        f"Coefficients: a row for each term; columns: {', '.join(which.names)}.",
         WIDTH,
         initial_indent=" * ",
         subsequent_indent=" * ",
         break_long_words=False,
         break_on_hyphens=False,
     )
-    return (
-        f"\n/*\n{told}\n */\n"
-        f"static const {c.real} {name}[{len(rows)}][{which.padded}] = {{\n{c.table(rows)}\n}};\n"
-    )
+    rows = c.table(which.coefficients)
+    return f"\n/*\n{told}\n */\nstatic const {c.real} {name}[{len(which.exponents)}][{columns}] = {{\n{rows}\n}};\n"
 
 
-def body(which: Polynomials, table: str, c: Printer, slopes: bool) -> str:
-    """Statements that write ``value[i]``, and ``slope[i][j]`` if asked for, from ``coded[j]``."""
+def body(which: Polynomials, table: str, columns: str, c: Printer, slopes: bool) -> str:
+    """Statements that write ``value[i]``, and ``slope[i][j]`` if asked for, from ``coded[j]``.
+
+    `table` and `columns` are what the code calls the table of coefficients and the number of its columns.
+    """
     used = variables_of(which.nodes)
     lines = [f"    const {c.real} {variable(k)} = coded[{k}];" for k in used] or ["    (void)coded; /* constant */"]
     if slopes:
         lines += [c.assignment(one, "    ") for one in products_of(which.nodes)]
-    if which.padded:
-        return "\n".join([*lines, *_side_by_side(which, table, c, slopes)])
+    if which.shared:
+        return "\n".join([*lines, *_side_by_side(which, table, columns, c, slopes)])
     return "\n".join([*lines, "", *_one_by_one(which, c, slopes)])
 
 
@@ -149,12 +156,12 @@ def _one_by_one(which: Polynomials, c: Printer, slopes: bool) -> list[str]:
     return lines
 
 
-def _side_by_side(which: Polynomials, table: str, c: Printer, slopes: bool) -> list[str]:
+def _side_by_side(which: Polynomials, table: str, columns: str, c: Printer, slopes: bool) -> list[str]:
     written = (gradient_of if slopes else value_of)(which.nodes[0], which.coefficient(0, table))
-    lines = [f"    {c.real} sum[{which.padded}];"]
+    lines = [f"    {c.real} sum[{columns}];"]
     if slopes:
-        lines.append(f"    {c.real} by[{which.n_factors}][{which.padded}];")
-    lines += ["", f"    for (int j = 0; j < {which.padded}; ++j) {{"]
+        lines.append(f"    {c.real} by[{which.n_factors}][{columns}];")
+    lines += ["", f"    for (int j = 0; j < {columns}; ++j) {{"]
     lines += [c.assignment(one, " " * 8) for one in written.statements]
     lines.append(f"        sum[j] = {c.sum(written.value, ' ' * 12)};")
     lines += [f"        by[{k}][j] = {c.sum(s, ' ' * 12)};" for k, s in enumerate(written.slopes)]

@@ -27,6 +27,8 @@ class Precision:
     dependent : float
         Rows of the Jacobian whose square is less than this fraction of the longest are taken for combinations of
         others.
+    lanes : tuple of int
+        Numbers in a vector of SSE2 or NEON, and of AVX.
     agreement : float
         Largest difference from ``model.json``, relative to what the terms add up to.
     """
@@ -38,8 +40,9 @@ class Precision:
     still: float
     still_certified: float
     dependent: float
+    lanes: tuple[int, int]
     agreement: float
 
 
-DOUBLE = Precision(DOUBLE_TEXT, "", BOX_TOLERANCE, TARGET_TOLERANCE, STILL, STILL_CERTIFIED, 1e-24, 1e-12)
-SINGLE = Precision(SINGLE_TEXT, "_float", 1e-6, 1e-5, 1e-5, 1e-4, 1e-10, 1e-5)
+DOUBLE = Precision(DOUBLE_TEXT, "", BOX_TOLERANCE, TARGET_TOLERANCE, STILL, STILL_CERTIFIED, 1e-24, (2, 4), 1e-12)
+SINGLE = Precision(SINGLE_TEXT, "_float", 1e-6, 1e-5, 1e-5, 1e-4, 1e-10, (4, 8), 1e-5)

@@ -12,7 +12,7 @@ from ..links import LOG, unit_of
 from . import c99_inverse_text as inverse_text
 from . import c99_text as text
 from .base import plain
-from .c99_polynomials import Polynomials, body, polynomials, table_text
+from .c99_polynomials import Polynomials, body, columns_text, polynomials, table_text
 from .c99_precision import Precision
 from .c99_print import affine_sum
 from .inverse_plan import InversePlan, inverse_plan
@@ -37,12 +37,10 @@ class Parts:
     precision : Precision
     max_iterations : int
         Most steps of an inverse without certificate.
-    lanes : int
-        Rows of shared tables are padded to a multiple of it.
     """
 
-    def __init__(self, model: "Surrogate", prefix: str, precision: Precision, max_iterations: int, lanes: int) -> None:
-        self.model, self.precision, self.lanes = model, precision, lanes
+    def __init__(self, model: "Surrogate", prefix: str, precision: Precision, max_iterations: int) -> None:
+        self.model, self.precision = model, precision
         self.names = {"p": prefix, "P": prefix.upper(), "real": precision.printer.real}
         self.plan: InversePlan = inverse_plan(model, max_iterations)
         self.has_inverse = not obstacle(model)
@@ -55,7 +53,7 @@ class Parts:
             f"{r.name} [{unit_of(link, r.name, plain(r.unit))}]"
             for r, link in zip(model.responses, model.links, strict=True)
         ]
-        return polynomials(model.terms.exponents, model.coefficients, labels, len(model.factors), self.lanes)
+        return polynomials(model.terms.exponents, model.coefficients, labels, len(model.factors))
 
     @cached_property
     def moved(self) -> Polynomials | None:
@@ -65,7 +63,7 @@ class Parts:
         mixed = self.model.coefficients @ self.plan.gain.T
         mixed[self.model.terms.degrees == 0] = 0.0
         names = [f"coded {name}" for name in self.model.factors.names]
-        return polynomials(self.model.terms.exponents, mixed, names, len(self.model.factors), self.lanes)
+        return polynomials(self.model.terms.exponents, mixed, names, len(self.model.factors))
 
     def source(self) -> str:
         """The text of the source file."""
@@ -97,15 +95,14 @@ class Parts:
 
     def _common(self) -> dict[str, str]:
         c, model, p = self.precision.printer, self.model, self.names["p"]
-        table = f"{p}_coefficients"
+        table, columns = f"{p}_coefficients", f"{self.names['P']}_COLUMNS"
         values = {
             "math": "#include <math.h>\n" if model.has_logs else "",
             "largest": c.limit,
-            "tables": table_text(self.forward, table, c)
-            + (table_text(self.moved, f"{p}_mixed", c) if self.moved else ""),
+            "tables": self._tables(),
             "coding": self._coding(),
             "box": c.number(self.box()),
-            "polynomials": body(self.forward, table, c, slopes=False),
+            "polynomials": body(self.forward, table, columns, c, slopes=False),
             "values": "Responses, of some the logarithm," if model.has_logs else "Responses",
             "value": "response (of some: d logarithm)" if model.has_logs else "response",
         }
@@ -115,9 +112,17 @@ class Parts:
                 "slope": "\n".join(f"    jacobian[{j}][{i}] = {c.number(v)};" for (j, i), v in np.ndenumerate(slope))
             }
         return values | {
-            "gradients": body(self.forward, table, c, slopes=True),
+            "gradients": body(self.forward, table, columns, c, slopes=True),
             "per_half": c.list(1.0 / model.factors.half_range),
         }
+
+    def _tables(self) -> str:
+        """Tables of what is evaluated side by side; both have a column for each response."""
+        p, columns, c = self.names["p"], f"{self.names['P']}_COLUMNS", self.precision.printer
+        text = table_text(self.forward, f"{p}_coefficients", columns, c)
+        if self.moved:
+            text += table_text(self.moved, f"{p}_mixed", columns, c)
+        return columns_text(self.forward.n, columns, self.precision.lanes) + text if text else ""
 
     def _coding(self) -> str:
         c, lines = self.precision.printer, []
@@ -158,7 +163,10 @@ class Parts:
         p = self.names["p"]
         coded = [f"coded[{i}]" for i in range(len(model.factors))]
         ranges = zip(model.factors.centre, model.factors.half_range, coded, strict=True)
-        moved, moved_to = (body(self.moved, f"{p}_mixed", c, with_slope) if self.moved else "" for with_slope in (True, False))
+        columns = f"{self.names['P']}_COLUMNS"
+        moved, moved_to = (
+            body(self.moved, f"{p}_mixed", columns, c, with_slope) if self.moved else "" for with_slope in (True, False)
+        )
         return {
             "low": c.list([f.low for f in model.factors]),
             "high": c.list([f.high for f in model.factors]),

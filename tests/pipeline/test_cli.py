@@ -17,7 +17,7 @@ import pytest
 from pipeline import load_config
 from pipeline.cli import main
 from pipeline.config import parse_config
-from surrogates import dumps
+from surrogates import dumps, exports
 from tests.pipeline.bad_inputs import BAD, MINIMAL, Bad
 from tests.pipeline.cases import CONFIGS, SMALL, A, C, Counted, D, config_text, contents, reproducible
 from tests.surrogates.cases import folded, surrogate, underdetermined, unit_box
@@ -297,7 +297,7 @@ class TestExitCodes:
         "argv",
         [
             [], ["rnu"], ["run"], ["run", SMOKE, "--ouT", "x"], ["check", SMOKE, "--out", "x"], ["predict", "m"],
-            ["export", "m", "--to", "c99"], ["list", "more"],
+            ["export", "m", "--too", "c99"], ["verify"], ["list", "more"],
         ],
     )  # fmt: skip
     def test_2_for_bad_arguments(self, argv, capsys):
@@ -313,7 +313,7 @@ class TestExitCodes:
             main(["--help"])
         assert stopped.value.code == 0
         text = " ".join(capsys.readouterr().out.split())
-        for word in ("run", "check", "plan", "report", "predict", "invert", "export", "list"):
+        for word in ("run", "check", "plan", "report", "predict", "invert", "export", "verify", "list"):
             assert f" {word} " in text
         assert "2 bad config" in text
 
@@ -660,10 +660,12 @@ class TestBadModel:
 
 
 class TestExport:
+    FILES = ("export.json", "model.json", "smoke.c", "smoke.h", "smoke_selftest.c")
+
     def test_gives_what_the_run_gave(self, smoke, model, tmp_path, answered):
-        out, _ = answered("export", model, "--to", "c99", "--out", tmp_path / "code")
+        out, _ = answered("export", model, "--to", "c99", "--out", tmp_path / "code", "--no-verify")
         assert contents(tmp_path / "code") == contents(smoke.path / "exports" / "c99")
-        assert sorted(out.split()) == [str(tmp_path / "code" / name) for name in ("smoke.c", "smoke.h")]
+        assert sorted(out.split()) == [str(tmp_path / "code" / name) for name in self.FILES]
 
     def test_refuses_to_overwrite_without_force(self, model, tmp_path, refused, answered):
         (tmp_path / "smoke.c").write_text("mine")
@@ -671,16 +673,33 @@ class TestExport:
         assert "already holds smoke.c" in sentence
         assert "--force" in sentence
         assert contents(tmp_path) == {"smoke.c": b"mine"}
-        answered("export", model, "--to", "c99", "--out", tmp_path, "--force")
+        answered("export", model, "--to", "c99", "--out", tmp_path, "--force", "--no-verify")
         assert (tmp_path / "smoke.c").read_bytes() != b"mine"
 
     def test_prefix(self, model, tmp_path, answered, refused):
-        answered("export", model, "--to", "c99", "--out", tmp_path / "o", "--prefix", "leaf")
-        assert sorted(contents(tmp_path / "o")) == ["leaf.c", "leaf.h"]
+        answered("export", model, "--to", "c99", "--out", tmp_path / "o", "--prefix", "leaf", "--no-verify")
+        assert {"leaf.c", "leaf.h"} <= set(contents(tmp_path / "o"))
         for prefix in ("while", "a b", "../x"):
             refused("export", model, "--to", "c99", "--out", tmp_path / "p", "--prefix", prefix)
         assert not (tmp_path / "p").exists()
         assert not (tmp_path / "x.c").exists()
+
+    def test_another_prefix_leaves_nothing_of_the_first(self, model, tmp_path, answered):
+        for prefix in ("leaf", "stem"):
+            answered("export", model, "--to", "c99", "--out", tmp_path, "--prefix", prefix, "--force", "--no-verify")
+        assert set(contents(tmp_path)) == {"export.json", "model.json", "stem.c", "stem.h", "stem_selftest.c"}
+
+    def test_several_targets_have_a_folder_each(self, model, tmp_path, answered):
+        answered("export", model, "--to", "c99,c99_float", "--out", tmp_path, "--no-verify")
+        assert sorted(p.name for p in tmp_path.iterdir()) == ["c99", "c99_float"]
+
+    def test_a_setting_of_the_target(self, model, tmp_path, answered, refused):
+        answered("export", model, "--to", "c99", "--out", tmp_path, "--set", "max_iterations=7", "--no-verify")
+        assert "at most 7 Gauss-Newton steps" in (tmp_path / "smoke.h").read_text(encoding="ascii")
+        wrong = refused("export", model, "--to", "c99", "--out", tmp_path / "o", "--set", "max_iteration=7")
+        assert "export 'c99' has no setting 'max_iteration'; did you mean 'max_iterations'?" in wrong
+        both = refused("export", model, "--to", "c99,c99_float", "--out", tmp_path / "o", "--set", "max_iterations=9")
+        assert "--set needs a single target" in both
 
     def test_unknown_target(self, model, tmp_path, refused):
         assert "unknown export 'c9'; did you mean 'c99'?" in refused("export", model, "--to", "c9", "--out", tmp_path)
@@ -688,6 +707,12 @@ class TestExport:
     def test_out_is_a_file(self, model, tmp_path, refused):
         (tmp_path / "file").write_text("mine")
         assert "cannot write to" in refused("export", model, "--to", "c99", "--out", tmp_path / "file")
+
+    def test_without_a_model_the_targets_are_listed(self, answered, refused, model):
+        out, _ = answered("export")
+        for name in exports.TARGETS:
+            assert f"  {name}  " in out
+        assert "an export needs --to NAME" in refused("export", model)
 
 
 class TestReport:

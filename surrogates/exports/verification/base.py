@@ -126,7 +126,7 @@ def agreement(what: str, got: ArrayLike, expected: ArrayLike, size: ArrayLike, t
     relative = np.abs(got - expected) / np.asarray(size, dtype=np.float64)
     worst = float(np.where(np.isnan(relative), np.inf, relative).max())
     outcome = Outcome.AGREES if worst <= tolerance else Outcome.DIFFERS
-    return Finding(what, outcome, f"largest relative difference {worst:.2g}, allowed {tolerance:g}")
+    return Finding(what, outcome, f"{worst:.2g} relative, allowed {tolerance:g}")
 
 
 def statement(what: str, holds: bool, detail: str = "") -> Finding:
