@@ -47,7 +47,9 @@ class Manifest:
     files: dict[str, str]
 
 
-def generate(model_text: str, target: str, prefix: str, settings: Mapping[str, Any]) -> tuple[dict[str, bytes], list[str]]:
+def generate(
+    model_text: str, target: str, prefix: str, settings: Mapping[str, Any]
+) -> tuple[dict[str, bytes], list[str]]:
     """Files of an export by name, its manifest and the model among them; and notes on what could not be added.
 
     Raises
@@ -121,7 +123,9 @@ def verified(folder: Path) -> list[Finding]:
 def told(folder: Path) -> str:
     """What the last verification of an export found, in words; empty if there was none."""
     try:
-        outcomes = [row["outcome"] for row in csv.DictReader(io.StringIO((folder / FINDINGS).read_text(encoding="utf-8")))]
+        outcomes = [
+            row["outcome"] for row in csv.DictReader(io.StringIO((folder / FINDINGS).read_text(encoding="utf-8")))
+        ]
     except (OSError, ValueError, KeyError):
         return ""
     words = {Outcome.AGREES: "checks agree", Outcome.DIFFERS: "differ", Outcome.NOT_CHECKED: "not checked"}
@@ -169,7 +173,9 @@ def _manifest(folder: Path) -> Manifest:
     kinds = {"target": str, "prefix": str, "settings": dict, "flexdoce": str, "files": dict}
     for key, kind in kinds.items():
         if not isinstance(document.get(key), kind):
-            raise InputError(f"{path}: {key} must be {'a text' if kind is str else 'a table'}, got {document.get(key)!r}")
+            raise InputError(
+                f"{path}: {key} must be {'a text' if kind is str else 'a table'}, got {document.get(key)!r}"
+            )
     if document["target"] not in exports.TARGETS:
         raise InputError(f"{path}: this version has no export {document['target']!r}")
     manifest = Manifest(SCHEMA, **{key: document[key] for key in kinds})

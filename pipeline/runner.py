@@ -164,7 +164,8 @@ class _Runner:
             exported, differing = self._export()
         outcome = Outcome(
             folder.path, study, screening_runs, screening, kept, fit_runs, model, validation_runs, trip,
-            (*stages.shortfalls(study, model, grown.rounds), *differing), self.seconds, grown.rounds, commanded, exported,
+            (*stages.shortfalls(study, model, grown.rounds), *differing), self.seconds, grown.rounds, commanded,
+            exported,
         )  # fmt: skip
         folder.write("provenance.json", provenance_json(started, datetime.now(UTC), self.seconds))
         with self._timed("report"):

@@ -18,9 +18,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.exports", description=__doc__)
     parser.add_argument("--flags", action="append", help="flags of the compiler, several times for several tables")
     parser.add_argument("--compiler", default=shutil.which("gcc") or "cc")
-    parser.add_argument("--model", type=Path, action="append", default=[], help="a model.json beside the built-in cases")
+    parser.add_argument(
+        "--model", type=Path, action="append", default=[], help="a model.json beside the built-in cases"
+    )
     given = parser.parse_args(arguments)
-    told = subprocess.run([given.compiler, "--version"], capture_output=True, text=True, check=True).stdout.splitlines()[0]
+    told = subprocess.run(
+        [given.compiler, "--version"], capture_output=True, text=True, check=True
+    ).stdout.splitlines()[0]
     print(f"{datetime.now(UTC):%Y-%m-%d}, {_processor()}, {told}, {', '.join(map(_version, PACKAGES))}.\n")
     more = {f"{path.parent.name}": load(path) for path in given.model}
     for flags in given.flags or FLAGS:

@@ -1,4 +1,4 @@
-"""Models that are timed: dense, sparse and certified, made here from a seed; polynomials of 6 factors to 6 responses."""
+"""Models that are timed: dense and sparse certified polynomials of 6 factors to 6 responses, made from a seed."""
 
 from dataclasses import replace
 from itertools import combinations_with_replacement

@@ -114,7 +114,9 @@ def timings(
         objects = []
         for name in (n for n in (*sources, "main.c") if n.endswith(".c")):
             # One object each: no compiler sees through a call.
-            subprocess.run([compiler, "-std=c99", *flags.split(), "-c", name, "-o", f"{name}.o"], cwd=folder, check=True)
+            subprocess.run(
+                [compiler, "-std=c99", *flags.split(), "-c", name, "-o", f"{name}.o"], cwd=folder, check=True
+            )
             objects.append(f"{name}.o")
         subprocess.run([compiler, *objects, "-o", "timed", "-lm"], cwd=folder, check=True)
         given = np.ascontiguousarray(x[:N_POINTS]).tobytes() + np.ascontiguousarray(y[:N_POINTS]).tobytes()

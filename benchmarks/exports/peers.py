@@ -17,8 +17,8 @@ NEWTON_STEPS = 3
 def casadi_sources(model: Surrogate) -> tuple[dict[str, str], list[Timed]]:
     """C that CasADi generates: monomials as a user would write them, nested as our export writes them, and inverses.
 
-    The inverse is given in both ways that CasADi offers for C: its Newton root finder (the one that it can generate code for), and Newton steps unrolled with a
-    symbolic solve; the quicker one is the peer.
+    The inverse is given in both ways that CasADi offers for C: the root finder that it can generate code for, and
+    Newton steps unrolled with a symbolic solve.
     """
     import casadi as ca
 
@@ -51,7 +51,7 @@ def casadi_sources(model: Surrogate) -> tuple[dict[str, str], list[Timed]]:
     return {"casadi_generated.c": generator.dump()}, timed
 
 
-def _monomials(ca, model: Surrogate, coded):  # noqa: ANN001, ANN202
+def _monomials(ca, model: Surrogate, coded):
     products = []
     for exponents in model.terms.exponents:
         product = ca.SX(1)
@@ -62,7 +62,7 @@ def _monomials(ca, model: Surrogate, coded):  # noqa: ANN001, ANN202
     return ca.DM(model.coefficients.T) @ ca.vertcat(*products)
 
 
-def _timed(function, given: str) -> Timed:  # noqa: ANN001
+def _timed(function, given: str) -> Timed:
     name = function.name()
     work = max(1, function.sz_w() + 100), max(1, function.sz_iw() + 100)
     arguments, results = function.sz_arg() + 10, function.sz_res() + 10
@@ -70,8 +70,9 @@ def _timed(function, given: str) -> Timed:  # noqa: ANN001
     return Timed(
         name,
         f"int {name}(const double **arg, double **res, long long int *iw, double *w, int mem);",
-        f"static double w[{work[0]}]; static long long int iw[{work[1]}]; const double *arg[{arguments}] = {{{given}}}; "
-        f"double *res[{results}] = {{R{both}}}; {name}(arg, res, iw, w, 0);",
+        f"static double w[{work[0]}]; static long long int iw[{work[1]}]; "
+        f"const double *arg[{arguments}] = {{{given}}}; double *res[{results}] = {{R{both}}}; "
+        f"{name}(arg, res, iw, w, 0);",
     )
 
 

@@ -4,6 +4,7 @@ import json
 import re
 import textwrap
 import unicodedata
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar, Protocol, runtime_checkable
 
 from experiments.naming import check_name
@@ -27,20 +28,24 @@ _COMMENT_MARKS = re.compile(r"(?<=\*)(?=/)|(?<=/)(?=[*/])|(?<=\?)(?=\?)")
 class Target(Protocol):
     """Frozen settings and one pure method.
 
-    The law: the same settings, model and prefix give the same texts, byte for byte; the texts are
+    The law: the same settings, model and prefix give the same files, byte for byte; texts are
     ASCII, and nothing that a model carries as free text can become code.
+
+    A target may also have ``complete(files) -> (files, notes)``, which adds what only tools of this machine can make,
+    such as compiled libraries, and says what could not be added.
     """
 
     name: ClassVar[str]
     summary: ClassVar[str]
 
-    def render(self, model: "Surrogate", prefix: str) -> dict[str, str]:
-        """Texts by file name; `prefix` begins every public name in them.
+    def render(self, model: "Surrogate", prefix: str) -> Mapping[str, str | bytes]:
+        """Files by name; `prefix` begins every public name in them.
 
         Raises
         ------
         ValueError
-            If `prefix` is not allowed in this language, or a number of the model overflows.
+            If `prefix` is not allowed in this language, a number of the model overflows, or a package that is needed
+            is missing.
         """
         ...
 

@@ -47,7 +47,9 @@ class C99:
     summary: ClassVar[str] = "C99 header, source and self-test: forward, Jacobian, inverse, domain check"
     precision: ClassVar[Precision] = DOUBLE
 
-    max_iterations: int = parameter(MAX_ITERATIONS, "steps", "most Gauss-Newton steps of an inverse without certificate")
+    max_iterations: int = parameter(
+        MAX_ITERATIONS, "steps", "most Gauss-Newton steps of an inverse without certificate"
+    )
 
     def __post_init__(self) -> None:
         check_count("max_iterations of the C99 export", self.max_iterations, 1)

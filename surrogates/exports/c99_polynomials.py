@@ -2,7 +2,7 @@
 
 Polynomials that use much the same terms share one nesting and are evaluated side by side: the inner loop runs over
 the polynomials, a compiler makes vector instructions of it, and where the processor has vectors the rows of the table
-of coefficients are padded to whole ones. Others are evaluated one after the other, each with no more than its own terms.
+of coefficients are padded to whole ones. Others are evaluated one after the other, each with its own terms alone.
 """
 
 import textwrap
@@ -15,10 +15,22 @@ from numpy.typing import NDArray
 
 from .base import WIDTH
 from .c99_print import Printer
-from .horner import Coefficient, Entry, Node, count, edges, gradient_of, nest, products_of, value_of, variable, variables_of
+from .horner import (
+    Coefficient,
+    Entry,
+    Node,
+    count,
+    edges,
+    gradient_of,
+    nest,
+    products_of,
+    value_of,
+    variable,
+    variables_of,
+)
 
 WORTH = 2.0
-"""Side by side is chosen if it takes at most this many times the multiplications: vectors make up for more than that."""
+"""Side by side is chosen if it takes at most this many times the multiplications: vectors make up for more."""
 
 
 class Count(NamedTuple):

@@ -4,6 +4,7 @@ from string import Template
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..inversion import obstacle
 from .c99_precision import Precision
@@ -141,12 +142,14 @@ def selftest(model: "Surrogate", prefix: str, precision: Precision) -> str:
     """The program; its reference values are the model's at numbers that this precision can hold."""
     c, names = precision.printer, {"p": prefix, "P": prefix.upper(), "real": precision.printer.real}
     given = reference(model, N_RANDOM)
-    settings = _held(model, given, precision)
+    settings = _held(given, precision)
     expected, slopes = model.predict(settings), model.jacobian(settings)
     inverse = {
         "targets": c.table(given.targets),
         "least_found": str(len(settings)) if reaches_all(model) else "1",
-        "reached": c.table(2.0 * precision.target * _span(model, given.targets) + precision.agreement * given.magnitude),
+        "reached": c.table(
+            2.0 * precision.target * _span(model, given.targets) + precision.agreement * given.magnitude
+        ),
     }
     tables, ending = "", ""
     if not obstacle(model):
@@ -169,14 +172,14 @@ def selftest(model: "Surrogate", prefix: str, precision: Precision) -> str:
     return text.replace("\nstatic int differs(", f"{tables}\nstatic int differs(")
 
 
-def _held(model: "Surrogate", given: Reference, precision: Precision) -> np.ndarray:
+def _held(given: Reference, precision: Precision) -> NDArray[np.float64]:
     """Settings as the precision holds them, still in the ranges."""
     if not precision.ending:
         return given.settings
-    return np.float64(np.float32(given.settings))
+    return given.settings.astype(np.float32).astype(np.float64)
 
 
-def _span(model: "Surrogate", expected: np.ndarray) -> np.ndarray:
+def _span(model: "Surrogate", expected: NDArray[np.float64]) -> NDArray[np.float64]:
     """What a target's tolerance is a fraction of, in the responses' units."""
     logs = np.array([link != "identity" for link in model.links])
     return np.where(logs, np.abs(expected) * model.scale, model.scale)

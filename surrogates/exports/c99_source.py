@@ -79,7 +79,7 @@ class Parts:
         """How far from 0 a coded setting counts as inside: in single precision the ranges' own rounding is more."""
         factors = self.model.factors
         ends = np.maximum(np.abs([f.low for f in factors]), np.abs([f.high for f in factors]))
-        rounding = 4.0 * np.finfo(np.float32).eps * float((ends / factors.half_range).max())
+        rounding = 4.0 * float(np.finfo(np.float32).eps) * float((ends / factors.half_range).max())
         return 1.0 + max(self.precision.box, rounding if self.precision.ending else 0.0)
 
     def tolerance(self) -> NDArray[np.float64]:
@@ -138,7 +138,7 @@ class Parts:
 
     def _logarithms(self) -> dict[str, str]:
         """What the border between the polynomials and the responses adds; nothing without logarithms."""
-        logs, (p, P), c = logged(self.model), (self.names["p"], self.names["P"]), self.precision.printer
+        logs, P, c = logged(self.model), self.names["P"], self.precision.printer
         if not logs:
             names = ("exponentials", "chained", "logarithms", "wanted_here", "wanted_too", "in_link_units")
             return {**dict.fromkeys(names, ""), "wanted": "responses"}

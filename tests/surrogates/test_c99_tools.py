@@ -1,4 +1,4 @@
-"""Verification of the exported C by tools that we did not write: compilers, cppcheck, sanitizers, in both precisions."""
+"""Verification of the exported C, in both precisions, by tools that we did not write."""
 
 import shutil
 import subprocess
@@ -19,7 +19,9 @@ PRECISIONS = ("c99", "c99_float")
 
 def need(*tools):
     missing = [t for t in tools if shutil.which(t) is None]
-    return pytest.mark.skipif(bool(missing), reason=f"{' AND '.join(missing).upper()} NOT FOUND: that check was not made")
+    return pytest.mark.skipif(
+        bool(missing), reason=f"{' AND '.join(missing).upper()} NOT FOUND: that check was not made"
+    )
 
 
 def certified(model):

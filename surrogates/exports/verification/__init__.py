@@ -1,7 +1,7 @@
 """Proof that an export is the model it was made from: each target in its own language, at the same points.
 
-``verify("c99", model, "stage", folder)`` runs what lies in `folder` and returns findings. It needs tools that need not be
-there (compilers, Octave, onnxruntime): what is missing is a finding that says so.
+``verify("c99", model, "stage", folder)`` runs what lies in `folder` and returns findings. It needs tools that need not
+be there (compilers, Octave, onnxruntime): what is missing is a finding that says so.
 """
 
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from experiments.naming import suggestion
 
-from .base import Finding, Outcome, Verifier, not_checked
+from .base import Finding, Outcome, Verifier
 
 if TYPE_CHECKING:
     from ...model import Surrogate
