@@ -18,6 +18,8 @@ LONGEST = (
     "validation/test_fea_nonlinear_paths.py",
     "test_configs.py",
     "test_docs.py",
+    "surrogates/exports/test_c99_tools.py",
+    "surrogates/exports/test_fmi.py",
     "test_notebooks.py",
 )
 """Files that take most of a minute, in the order in which they begin: what compiles goes before what then finds it."""

@@ -1,6 +1,10 @@
-"""Code generated from a surrogate alone, one file a target: ``get("c99").render(model, "stage")``.
+"""Code generated from a surrogate alone, one folder or file a target: ``get("c99").render(model, "stage")``.
 
 A target is frozen settings and one pure method from a model to files by name; whoever calls it writes the files.
+
+What they share: `base` (the protocol, safe names and text), `horner` (polynomials as straight lines of code), `products`
+(their terms as a chain of products), `inverse_plan` (the inverse in numbers, the same steps in every language).
+`verification` proves each against its model.
 """
 
 from collections.abc import Mapping
@@ -11,14 +15,20 @@ from experiments.settings import build
 
 from .base import Target
 from .c99 import C99, C99Float
-from .casadi_sx import CasADi
 from .fmi import FMI2, FMI3
-from .numpy_file import NumPyFile
+from .iec61131 import StructuredText
+from .matlab import Matlab
 from .onnx_graph import ONNX
+from .python import CasADi, NumPyFile
 
-TARGETS: dict[str, type[Target]] = {cls.name: cls for cls in (C99, C99Float, FMI2, FMI3, NumPyFile, CasADi, ONNX)}
+TARGETS: dict[str, type[Target]] = {
+    cls.name: cls for cls in (C99, C99Float, FMI2, FMI3, NumPyFile, Matlab, StructuredText, CasADi, ONNX)
+}
 
-__all__ = ["C99", "FMI2", "FMI3", "ONNX", "TARGETS", "C99Float", "CasADi", "NumPyFile", "Target", "get"]
+__all__ = [
+    "C99", "FMI2", "FMI3", "ONNX", "TARGETS", "C99Float", "CasADi", "Matlab", "NumPyFile", "StructuredText", "Target",
+    "get",
+]  # fmt: skip
 
 
 def get(name: str, settings: Mapping[str, Any] | None = None) -> Target:

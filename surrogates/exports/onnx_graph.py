@@ -16,7 +16,7 @@ from ..inversion import BOX_TOLERANCE
 from ..links import logarithmic
 from .base import about, check_prefix
 from .products import Term, chain
-from .python_names import DEVICES
+from .python.names import DEVICES
 
 if TYPE_CHECKING:
     from ..model import Surrogate

@@ -22,6 +22,8 @@ MODULES = {
     "fmi2": "fmi:verify",
     "fmi3": "fmi:verify",
     "python": "numpy_file:verify",
+    "matlab": "matlab:verify",
+    "iec61131": "iec61131:verify",
     "casadi": "casadi_sx:verify",
     "onnx": "onnx_graph:verify",
 }

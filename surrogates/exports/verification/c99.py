@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..c99_precision import DOUBLE, SINGLE, Precision
+from ..c99.precision import DOUBLE, SINGLE, Precision
 from .base import Finding, Outcome, agreement, invertible, not_checked, reference, round_trip, run_tool, statement, tool
 
 if TYPE_CHECKING:

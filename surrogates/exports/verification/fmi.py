@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...links import to_responses
-from ..fmi_archive import NotCompiled, compiled, library_path, unpack, version_and_identifier
+from ..fmi.archive import NotCompiled, compiled, library_path, unpack, version_and_identifier
 from .base import (
     DOUBLE,
     Finding,

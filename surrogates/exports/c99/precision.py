@@ -1,0 +1,48 @@
+"""What differs between the double and the single-precision C: types, and how near is near enough."""
+
+from dataclasses import dataclass
+
+from ...inversion import BOX_TOLERANCE, TARGET_TOLERANCE
+from ..inverse_plan import STILL, STILL_CERTIFIED
+from .printing import DOUBLE as DOUBLE_TEXT
+from .printing import SINGLE as SINGLE_TEXT
+from .printing import Printer
+
+
+@dataclass(frozen=True)
+class Precision:
+    """Tolerances of one precision.
+
+    Parameters
+    ----------
+    printer : Printer
+    ending : str
+        Of the prefix, so that both variants can be linked into one program.
+    box : float
+        How far beyond ±1 a coded setting counts as inside.
+    target : float
+        Largest mismatch of a reached target, in units of the scale.
+    still, still_certified : float
+        Coded steps that count as none; the latter where convergence is known to be quadratic.
+    dependent : float
+        Rows of the Jacobian whose square is less than this fraction of the longest are taken for combinations of
+        others.
+    lanes : tuple of int
+        Numbers in a vector of SSE2 or NEON, and of AVX.
+    agreement : float
+        Largest difference from ``model.json``, relative to what the terms add up to.
+    """
+
+    printer: Printer
+    ending: str
+    box: float
+    target: float
+    still: float
+    still_certified: float
+    dependent: float
+    lanes: tuple[int, int]
+    agreement: float
+
+
+DOUBLE = Precision(DOUBLE_TEXT, "", BOX_TOLERANCE, TARGET_TOLERANCE, STILL, STILL_CERTIFIED, 1e-24, (2, 4), 1e-12)
+SINGLE = Precision(SINGLE_TEXT, "_float", 1e-6, 1e-5, 1e-5, 1e-4, 1e-10, (4, 8), 1e-5)

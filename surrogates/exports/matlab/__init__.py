@@ -1,0 +1,5 @@
+"""Functions for MATLAB and GNU Octave."""
+
+from .target import Matlab
+
+__all__ = ["Matlab"]

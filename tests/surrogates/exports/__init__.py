@@ -1,0 +1,1 @@
+"""Exports against the model that they were made from."""
