@@ -2,8 +2,9 @@
 
 A target is frozen settings and one pure method from a model to files by name; whoever calls it writes the files.
 
-What they share: `base` (the protocol, safe names and text), `horner` (polynomials as straight lines of code), `products`
-(their terms as a chain of products), `inverse_plan` (the inverse in numbers, the same steps in every language).
+What they share: `base` (the protocol, safe names and text), `horner` (polynomials as straight lines of code),
+`products` (their terms as a chain of products), `inverse_plan` (the inverse in numbers, the same steps in every
+language).
 `verification` proves each against its model.
 """
 

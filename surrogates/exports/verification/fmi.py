@@ -156,12 +156,12 @@ def _forward(model: "Surrogate", name: str, fmu: Running, points: Reference) -> 
 
 
 def _inverse(model: "Surrogate", name: str, fmu: Running, points: Reference) -> list[Finding]:
-    found, status = fmu.steps(points.responses)
+    found, status = fmu.steps(points.targets)
     good = np.flatnonzero(status == OK)
-    trip = round_trip(model, f"{name}: round trip", points.responses, found, status == OK, DOUBLE)
+    trip = round_trip(model, f"{name}: round trip", points.targets, found, status == OK, DOUBLE)
     if not good.size:
         return [trip]
-    last = fmu.step(points.responses[good[0]])[0]
+    last = fmu.step(points.targets[good[0]])[0]
     far = to_responses(model.links, model.predict_coded(np.zeros((1, len(model.factors))))[0] + FAR * model.scale)
     kept_far, refused_far = fmu.step(far)
     kept, refused = fmu.step(np.full(len(model.responses), np.nan))

@@ -17,7 +17,6 @@ from .base import DOUBLE, Finding, agreement, invertible, not_checked, reference
 from .edges import at_faces
 from .iec61131_parse import NotStructuredText, parse
 from .iec61131_run import Program
-from .targets import targets
 
 if TYPE_CHECKING:
     from ...model import Surrogate
@@ -128,7 +127,7 @@ def _statuses(model: "Surrogate", program: Program, prefix: str) -> list[Finding
 
 
 def _inverse(model: "Surrogate", program: Program, prefix: str) -> list[Finding]:
-    wanted, run = targets(model, reference(model, N_POINTS)), program.instance(f"{prefix}_inverse")
+    wanted, run = reference(model, N_POINTS).targets, program.instance(f"{prefix}_inverse")
     answers = [run(responses=row) for row in wanted]
     found = np.array([answer["settings"] for answer in answers])
     ok = np.array([answer["status"] == OK for answer in answers])

@@ -25,7 +25,6 @@ from .base import (
     statement,
     tool,
 )
-from .targets import targets
 
 if TYPE_CHECKING:
     from ...model import Surrogate
@@ -101,7 +100,7 @@ def verify_all(models: Sequence[tuple["Surrogate", str]], folder: Path) -> list[
 
 def _given(model: "Surrogate") -> Given:
     known = reference(model)
-    wanted = targets(model, known)
+    wanted = known.targets
     logs = np.array([link == "log" for link in model.links])
     beyond = np.where(logs, wanted[:1] * 1e30, wanted[:1] + 1e30 * model.scale)
     return Given(known, _spoiled(known.settings[0]), wanted, _spoiled(wanted[0]), beyond)
