@@ -20,6 +20,7 @@ LONGEST = (
     "test_docs.py",
     "surrogates/exports/test_c99_tools.py",
     "surrogates/exports/test_fmi.py",
+    "test_example_control.py",
     "test_notebooks.py",
 )
 """Files that take most of a minute, in the order in which they begin: what compiles goes before what then finds it."""
