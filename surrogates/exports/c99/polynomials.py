@@ -49,8 +49,8 @@ class Polynomials:
     exponents : tuple of tuple of int
         One per term.
     coefficients : ndarray, shape (n_terms, n_polynomials)
-    names : tuple of str
-        What each gives, for comments: plain text.
+    names, labels : tuple of str
+        What each polynomial gives and what each term is, for comments: plain text.
     n_factors : int
     shared : bool
         Whether they are evaluated side by side.
@@ -61,6 +61,7 @@ class Polynomials:
     exponents: tuple[tuple[int, ...], ...]
     coefficients: NDArray[np.float64]
     names: tuple[str, ...]
+    labels: tuple[str, ...]
     n_factors: int
     shared: bool
     nodes: tuple[Node, ...]
@@ -92,6 +93,7 @@ def polynomials(
     exponents: Sequence[tuple[int, ...]],
     coefficients: NDArray[np.float64],
     names: Sequence[str],
+    labels: Sequence[str],
     n_factors: int,
 ) -> Polynomials:
     """The polynomials in the quicker of the two ways."""
@@ -104,6 +106,7 @@ def polynomials(
         tuple(exponents),
         coefficients,
         tuple(names),
+        tuple(labels),
         n_factors,
         side_by_side,
         (shared,) if side_by_side else separate,
@@ -138,7 +141,7 @@ def table_text(which: Polynomials, name: str, columns: str, c: Printer) -> str:
         break_long_words=False,
         break_on_hyphens=False,
     )
-    rows = c.table(which.coefficients)
+    rows = c.table(which.coefficients, which.labels)
     return f"\n/*\n{told}\n */\nstatic const {c.real} {name}[{len(which.exponents)}][{columns}] = {{\n{rows}\n}};\n"
 
 

@@ -75,9 +75,12 @@ class Printer:
             return text
         return "\n" + textwrap.indent(textwrap.fill(text, 92), " " * 8) + "\n    "
 
-    def table(self, rows: NDArray[np.float64]) -> str:
-        """Rows of a two-dimensional initializer."""
-        return ",\n".join("    {" + ", ".join(self.number(float(v)) for v in row) + "}" for row in rows)
+    def table(self, rows: NDArray[np.float64], labels: Sequence[str] = ()) -> str:
+        """Rows of a two-dimensional initializer; `labels`, if any, say in a comment what each row is."""
+        written = ["    {" + ", ".join(self.number(float(v)) for v in row) + "}" for row in rows]
+        commas = [","] * (len(written) - 1) + [""]
+        notes = [f" /* {label} */" for label in labels] or [""] * len(written)
+        return "\n".join(a + b + c for a, b, c in zip(written, commas, notes, strict=True))
 
     def difference(self, name: str, value: float) -> str:
         """``name - value``, without a zero."""

@@ -53,7 +53,7 @@ class Parts:
             f"{r.name} [{unit_of(link, r.name, plain(r.unit))}]"
             for r, link in zip(model.responses, model.links, strict=True)
         ]
-        return polynomials(model.terms.exponents, model.coefficients, labels, len(model.factors))
+        return polynomials(model.terms.exponents, model.coefficients, labels, model.terms.labels, len(model.factors))
 
     @cached_property
     def moved(self) -> Polynomials | None:
@@ -63,7 +63,7 @@ class Parts:
         mixed = self.model.coefficients @ self.plan.gain.T
         mixed[self.model.terms.degrees == 0] = 0.0
         names = [f"coded {name}" for name in self.model.factors.names]
-        return polynomials(self.model.terms.exponents, mixed, names, len(self.model.factors))
+        return polynomials(self.model.terms.exponents, mixed, names, self.model.terms.labels, len(self.model.factors))
 
     def source(self) -> str:
         """The text of the source file."""
