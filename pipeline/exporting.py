@@ -4,10 +4,12 @@ import csv
 import hashlib
 import io
 import json
+import os
 import zipfile
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path, PurePath
+from tempfile import NamedTemporaryFile
 from typing import Any
 
 from surrogates import Surrogate, exports, loads
@@ -89,18 +91,31 @@ def write(folder: Path, files: Mapping[str, bytes], force: bool = False) -> list
             (folder / name).unlink()
         folder.mkdir(parents=True, exist_ok=True)
         for name, content in files.items():
-            partial = folder / f"{name}.partial"
-            partial.write_bytes(content)
-            partial.replace(folder / name)
+            _put(folder / name, content)
     except OSError as error:
         raise InputError(f"cannot write to {folder}: {error.strerror}") from None
     return [folder / name for name in files]
 
 
+def _put(path: Path, content: bytes) -> None:
+    """Write a file whole, under a name of its own first: what a link of either name points to is not touched."""
+    with NamedTemporaryFile(dir=path.parent, prefix=".", suffix=".partial", delete=False) as partial:
+        partial.write(content)
+    Path(partial.name).chmod(0o666 & ~_umask())
+    Path(partial.name).replace(path)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
 def verified(folder: Path) -> list[Finding]:
     """Whether the files of an export are those that were written, come from its model, and do what that does.
 
-    Nothing in the folder is compiled or run unless it is, byte for byte, what this version generates from the model.
+    Nothing in the folder is compiled or run unless it is, byte for byte, what this version generates from the model;
+    libraries inside FMUs never are.
     The findings are also written to ``verification.csv`` there, if the folder can be written.
 
     Raises
@@ -153,12 +168,21 @@ def _bytes(content: str | bytes) -> bytes:
 
 
 def _left_over(folder: Path, files: Mapping[str, bytes]) -> list[str]:
-    """Files of the export before that this one does not write."""
+    """Files of the export before, unchanged since, that this one does not write."""
     try:
-        before = [*_manifest(folder).files, FINDINGS]
+        before = _manifest(folder).files
     except InputError:
-        before = [FINDINGS]
-    return [name for name in before if name not in files and (folder / name).is_file()]
+        before = {}
+    ours = [name for name, digest in before.items() if name not in files and _digest(folder / name) == digest]
+    return [*ours, FINDINGS] if (folder / FINDINGS).is_file() else ours
+
+
+def _digest(path: Path) -> str:
+    """SHA-256 of a file; empty if there is none or it cannot be read."""
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
+    except OSError:
+        return ""
 
 
 def _manifest(folder: Path) -> Manifest:
@@ -180,7 +204,8 @@ def _manifest(folder: Path) -> Manifest:
         raise InputError(f"{path}: this version has no export {document['target']!r}")
     manifest = Manifest(SCHEMA, **{key: document[key] for key in kinds})
     for name, digest in manifest.files.items():
-        if name in ("", ".", "..") or PurePath(name).name != name or "\\" in name or not isinstance(digest, str):
+        odd = PurePath(name).name != name or not name.isprintable() or "\\" in name
+        if odd or name in ("", ".", "..") or not isinstance(digest, str):
             raise InputError(f"{path}: {name!r} is not the name of a file in this folder with its SHA-256")
     return manifest
 
@@ -196,12 +221,9 @@ def _read(folder: Path) -> tuple[Manifest, Surrogate]:
 def _unchanged(folder: Path, manifest: Manifest) -> list[Finding]:
     findings = []
     for name, digest in manifest.files.items():
-        try:
-            same = hashlib.sha256((folder / name).read_bytes()).hexdigest() == digest
-            said = "" if same else "it was changed after it was written: export it again"
-        except OSError as error:
-            same, said = False, f"it cannot be read: {error.strerror}"
-        if not same:
+        found = _digest(folder / name)
+        if found != digest:
+            said = "it was changed after it was written: export it again" if found else "it is missing or unreadable"
             findings.append(Finding(f"{name} as written", Outcome.DIFFERS, said))
     return findings or [Finding("files as written", Outcome.AGREES, f"{len(manifest.files)} files")]
 
@@ -213,25 +235,33 @@ def _regenerated(folder: Path, manifest: Manifest) -> Finding:
         target = exports.get(manifest.target, manifest.settings)
         texts = target.render(loads((folder / MODEL).read_text(encoding="utf-8")), manifest.prefix)
     except ValueError as error:
-        return Finding(what, Outcome.NOT_CHECKED, str(error))
-    differing = [n for n, content in texts.items() if not _same((folder / n).read_bytes(), _bytes(content))]
-    if not differing and set(texts) == set(manifest.files) - {MODEL}:
+        return Finding(what, Outcome.DIFFERS, f"they cannot be: {error}")
+    differing = sorted(set(texts) ^ (set(manifest.files) - {MODEL}))
+    if not differing:
+        differing = [n for n, content in texts.items() if not _same(folder / n, _bytes(content))]
+    if not differing:
         return Finding(what, Outcome.AGREES, "byte for byte")
-    named = ", ".join(differing) or "the list of files"
+    why = f"not what the model gives: {', '.join(differing)}"
     if manifest.flexdoce != __version__:
-        why = f"written by flexdoce {manifest.flexdoce}, this is {__version__}, which writes others: {named}"
-        return Finding(what, Outcome.NOT_CHECKED, f"{why}; export it again")
-    return Finding(what, Outcome.DIFFERS, f"not what the model gives: {named}")
+        why += f" (written by flexdoce {manifest.flexdoce}, this is {__version__}: export it again)"
+    return Finding(what, Outcome.DIFFERS, why)
 
 
-def _same(delivered: bytes, rendered: bytes) -> bool:
+def _same(path: Path, rendered: bytes) -> bool:
+    """Whether a file is as rendered; an archive may hold binaries more."""
+    delivered = path.read_bytes()
     if delivered == rendered:
         return True
     try:
         with zipfile.ZipFile(io.BytesIO(rendered)) as mine, zipfile.ZipFile(io.BytesIO(delivered)) as theirs:
-            extra = set(theirs.namelist()) - set(mine.namelist())
-            return all(n.startswith("binaries/") for n in extra) and all(
-                theirs.read(n) == mine.read(n) for n in mine.namelist()
+            sizes = {m.filename: m.file_size for m in theirs.infolist()}
+            wanted = {m.filename: m.file_size for m in mine.infolist()}
+            # Sizes first: an archive may unpack to far more than it is.
+            return (
+                len(sizes) == len(theirs.infolist())
+                and all(sizes.get(n) == size for n, size in wanted.items())
+                and all(n.startswith("binaries/") for n in sizes.keys() - wanted.keys())
+                and all(theirs.read(n) == mine.read(n) for n in wanted)
             )
     except (zipfile.BadZipFile, KeyError, OSError, ValueError):
         return False
@@ -239,6 +269,6 @@ def _same(delivered: bytes, rendered: bytes) -> bool:
 
 def _keep(folder: Path, findings: list[Finding]) -> None:
     try:
-        (folder / FINDINGS).write_text(findings_csv(findings), encoding="utf-8", newline="\n")
+        _put(folder / FINDINGS, findings_csv(findings).encode())
     except OSError:
         return  # a folder that cannot be written is still verified

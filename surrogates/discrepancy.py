@@ -67,12 +67,13 @@ def correct(cheap: Surrogate, X: ArrayLike, y: ArrayLike, kind: str = "scaled", 
     kind : str
         One of :data:`KINDS`.
     degree : int
-        Of d or ρ. Terms of d are chosen by evidence and may outnumber the runs; ρ is by plain least squares.
+        Of d, from 1, or of ρ, from 0. Terms of d are chosen by evidence and may outnumber the runs; ρ is by plain
+        least squares.
 
     Raises
     ------
     ValueError
-        If the kind is unknown, the degree negative or no whole number, the shapes disagree, a value is not finite, the
+        If the kind is unknown, the degree too low or no whole number, the shapes disagree, a value is not finite, the
         cheap model has logarithms, or there are too few runs: more than ρ has terms, or 3.
 
     Notes
@@ -97,8 +98,9 @@ def _checked(
     X, y = np.asarray(X, dtype=np.float64), np.asarray(y, dtype=np.float64)
     if kind not in KINDS:
         raise ValueError(f"kind must be one of {', '.join(KINDS)}, got {kind!r}")
-    if isinstance(degree, bool) or not isinstance(degree, (int, np.integer)) or degree < 0:
-        raise ValueError(f"degree must be a whole number from 0, got {degree!r}")
+    lowest = 0 if kind == "multiplicative" else 1
+    if isinstance(degree, bool) or not isinstance(degree, (int, np.integer)) or degree < lowest:
+        raise ValueError(f"the degree of a correction {kind!r} must be a whole number from {lowest}, got {degree!r}")
     if cheap.has_logs:
         raise ValueError("the cheap model has logarithms of responses; fit it with response_transform='none'")
     expected = (len(cheap.factors), len(cheap.responses))
@@ -111,7 +113,7 @@ def _checked(
         raise ValueError("X and y must be finite: leave out runs that failed")
     needed = len(_polynomial(cheap.factors, degree)) + 1 if kind == "multiplicative" else 3
     if len(X) < needed:
-        raise ValueError(f"a {kind} correction of degree {degree} needs {needed} runs or more, got {len(X)}")
+        raise ValueError(f"correction {kind!r} of degree {degree} needs {needed} runs or more, got {len(X)}")
     return X, y
 
 

@@ -22,6 +22,9 @@ TARGET_TOLERANCE = 1e-9
 
 MAX_ITERATIONS = 50
 
+HARMLESS = 1e-11
+"""Coded error that leaving out one entry of an inverse may make."""
+
 FITTED_ROUNDING = 64
 """Relative rounding error of a fitted coefficient, in units of eps."""
 
@@ -153,18 +156,29 @@ def affine_inverse(model: "Surrogate") -> AffineInverse:
     centre, half = model.factors.centre, model.factors.half_range
     constant, slope = _affine_part(model)
     scaled = slope / model.scale[:, None]
-    inverse = np.linalg.pinv(scaled)
-    singular = np.linalg.svd(scaled, compute_uv=False)
-    rounding = max(scaled.shape) * np.finfo(float).eps
-    lost = singular[-1] <= rounding * singular[0]
-    condition = np.inf if lost else float(singular[0] / singular[-1])
-    if not lost:
-        # Fitted coefficients carry rounding errors of some tens of eps; an entry of the inverse that is no larger
-        # than what they make of it is a structural zero, and a controller need not multiply by it.
-        carried = FITTED_ROUNDING * np.finfo(float).eps * condition
-        inverse[np.abs(inverse) <= carried * np.abs(inverse).max()] = 0.0
+    inverse, condition = pseudo_inverse(scaled)
     gain = half[:, None] * inverse / model.scale
     return AffineInverse(gain, centre - gain @ constant, condition)
+
+
+def pseudo_inverse(scaled: NDArray[np.floating]) -> tuple[NDArray[np.floating], float]:
+    """Pseudo-inverse of a slope in coded factors and scaled responses, with its condition number; infinite if singular.
+
+    Fitted coefficients carry rounding errors of some tens of eps. An entry of the inverse that is no larger than what
+    they make of it is a structural zero, and a controller need not multiply by it; but only while all that it does to
+    a coded setting is far below what an answer is checked to.
+    """
+    singular = np.linalg.svd(scaled, compute_uv=False)
+    eps = float(np.finfo(float).eps)
+    if singular[-1] <= max(scaled.shape) * eps * singular[0]:
+        return np.linalg.pinv(scaled), np.inf
+    # Elimination keeps zeros of blocks and small rows beside large ones; singular values mix them.
+    inverse = np.linalg.inv(scaled) if scaled.shape[0] == scaled.shape[1] else np.linalg.pinv(scaled)
+    condition = float(singular[0] / singular[-1])
+    carried = FITTED_ROUNDING * eps * condition * np.abs(inverse).max()
+    felt = np.abs(inverse) * np.abs(scaled).max(axis=1)
+    inverse[felt <= min(carried, HARMLESS)] = 0.0
+    return inverse, condition
 
 
 def invert(model: "Surrogate", targets: ArrayLike) -> Inversion:

@@ -22,6 +22,9 @@ class Entry(NamedTuple):
     row: int
 
 
+HIGHEST = 200
+"""Degree up to which nesting is written: one level a variable taken out."""
+
 Coefficient = float | Entry
 Product = tuple[Coefficient, tuple[str, ...]]
 """A coefficient and the names it multiplies."""
@@ -67,7 +70,16 @@ def variable(factor: int) -> str:
 
 
 def nest(exponents: Sequence[tuple[int, ...]], rows: Iterable[int], n_factors: int) -> Node:
-    """The terms at `rows` of `exponents`, nested; the first of the most frequent variables is taken out first."""
+    """The terms at `rows` of `exponents`, nested; the first of the most frequent variables is taken out first.
+
+    Raises
+    ------
+    ValueError
+        If a term is of a degree above :data:`HIGHEST`.
+    """
+    rows = list(rows)
+    if (highest := max((sum(exponents[row]) for row in rows), default=0)) > HIGHEST:
+        raise ValueError(f"this model cannot be exported: it has a term of degree {highest}, the highest is {HIGHEST}")
     return _nest([(tuple(exponents[row]), row) for row in rows], (0,) * n_factors)
 
 

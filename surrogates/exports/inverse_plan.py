@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..certificate import Verdict
 from ..convergence import TOLERANCE
-from ..inversion import BOX_TOLERANCE, FITTED_ROUNDING, TARGET_TOLERANCE
+from ..inversion import BOX_TOLERANCE, TARGET_TOLERANCE, pseudo_inverse
 
 if TYPE_CHECKING:
     from ..model import Surrogate
@@ -23,6 +23,12 @@ STILL_CERTIFIED = 1e-8
 TRIED = 6
 """Newton steps that are tried before the chord steps, where the certificate counts only these."""
 
+WELL = 1e6
+"""Condition up to which answers come from the gain alone; beyond, steps on the residual correct its rounding."""
+
+MOST_CHORDS = 1000
+"""More are of no use in a controller: such a model is exported as one without certificate."""
+
 CHORD_LEAVES = 1e-12
 """Coded error after the chord steps."""
 
@@ -31,21 +37,21 @@ CHORD_LEAVES = 1e-12
 class InversePlan:
     """What an exported inverse does with targets in link units (logarithms taken).
 
-    1. Coded settings x = gain · (target − constant). If the model is affine, these are the answer.
+    1. Coded settings x = gain · (target − constant). If the plan is `affine`, these are the answer.
     2. Otherwise x is clipped to [−1, 1], and at most `steps` times: x moves by the Newton step (the Gauss–Newton step
        of least norm where the map is not square) and is clipped to [−limit, limit]; the iteration ends once no coded
        setting moved by `still`.
     3. If it did not end and there are `chords`: x begins again as in 2, and so many times moves by
        gain · (target − value at x) and is clipped.
-    4. The answer is good if it lies in the domain to `box` and the polynomials give the target there to `tolerance`.
-       Then rounding beyond the ranges is taken off. Anything else is refused with a status.
+    4. The answer must lie in the domain to `box`. Rounding beyond the ranges is taken off; it is good if the
+       polynomials then give the target to `tolerance`. Anything else is refused with a status.
 
     Step 1 is the Newton step from the centre of the domain.
 
     Parameters
     ----------
     affine : bool
-        Whether step 1 is the answer.
+        Whether step 1 is the answer: the model is affine and not nearly singular.
     gain : ndarray, shape (n_factors, n_responses)
         Pseudo-inverse of the Jacobian at the centre: coded settings per link unit.
     constant : ndarray, shape (n_responses,)
@@ -91,17 +97,19 @@ def inverse_plan(model: "Surrogate", max_iterations: int) -> InversePlan:
     """
     centre = np.zeros((1, len(model.factors)))
     constant, slope = model.predict_coded(centre)[0], model.jacobian_coded(centre)[0]
+    inverse, condition = pseudo_inverse(slope / model.scale[:, None])
+    well = condition <= WELL
     newton, chords = _counted(model)
-    contracting = chords > 0
+    affine, contracting = model.is_affine and (well or not np.isfinite(condition)), well and chords > 0
     return InversePlan(
-        affine=model.is_affine,
-        gain=_gain(slope, model.scale),
+        affine=affine,
+        gain=inverse / model.scale,
         constant=constant,
-        steps=0 if model.is_affine else newton or (TRIED if contracting else max_iterations),
+        steps=0 if affine else newton or (TRIED if contracting else max_iterations),
         chords=chords if contracting and not newton else 0,
         limit=1.0 if newton or contracting else 2.0,
         still=STILL_CERTIFIED if contracting else STILL,
-        certified=model.is_affine or newton > 0 or contracting,
+        certified=affine or (well and newton > 0) or contracting,
         contracting=contracting,
         box=BOX_TOLERANCE,
         tolerance=TARGET_TOLERANCE * model.scale,
@@ -119,16 +127,5 @@ def _counted(model: "Surrogate") -> tuple[int, int]:
     if known.chord_iterations and known.contraction is not None:
         further = log(CHORD_LEAVES / TOLERANCE) / log(known.contraction) if known.contraction else 1.0
         chords = known.chord_iterations + ceil(further)
+    chords = chords if chords <= MOST_CHORDS else 0
     return known.newton_iterations or 0, chords
-
-
-def _gain(slope: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Pseudo-inverse of the scaled slope; what is no larger than carried rounding is a structural zero."""
-    scaled = slope / scale[:, None]
-    inverse = np.linalg.pinv(scaled)
-    singular = np.linalg.svd(scaled, compute_uv=False)
-    eps = np.finfo(float).eps
-    if singular[-1] > max(scaled.shape) * eps * singular[0]:
-        carried = FITTED_ROUNDING * eps * singular[0] / singular[-1]
-        inverse[np.abs(inverse) <= carried * np.abs(inverse).max()] = 0.0
-    return inverse / scale

@@ -71,7 +71,7 @@ def test_code_that_the_model_does_not_give_is_not_run_even_if_the_manifest_agree
     manifest["flexdoce"] = "0.0.1"
     (folder / "export.json").write_text(json.dumps(manifest), encoding="utf-8")
     found = exporting.verified(folder)
-    assert [f.outcome for f in found] == [Outcome.AGREES, Outcome.NOT_CHECKED, Outcome.NOT_CHECKED]
+    assert [f.outcome for f in found] == [Outcome.AGREES, Outcome.DIFFERS, Outcome.NOT_CHECKED]
     assert "written by flexdoce 0.0.1" in found[1].detail
 
 
@@ -82,6 +82,8 @@ def test_code_that_the_model_does_not_give_is_not_run_even_if_the_manifest_agree
         ({"target": "c98"}, "this version has no export 'c98'"),
         ({"files": {"../dev.c": "0"}}, "'../dev.c' is not the name of a file in this folder"),
         ({"files": {"a\\b": "0"}}, "is not the name of a file in this folder"),
+        ({"files": {"a\x00b": "0"}}, "is not the name of a file in this folder"),
+        ({"files": {"\ud800": "0"}}, "is not the name of a file in this folder"),
         ({"files": {"dev.c": 3}}, "'dev.c' is not the name of a file in this folder with its SHA-256"),
         ({"settings": 3}, "settings must be a table, got 3"),
         ({"prefix": None}, "prefix must be a text, got None"),
@@ -114,7 +116,7 @@ def test_a_model_of_another_schema_or_changed_is_refused(folder):
 
 def test_a_read_only_folder_is_verified_all_the_same(folder, monkeypatch):
     monkeypatch.setattr(exporting, "verify", lambda *_: [])
-    monkeypatch.setattr("pathlib.Path.write_text", _no_space)
+    monkeypatch.setattr(exporting, "_put", _no_space)
     assert set(outcomes(folder).values()) == {Outcome.AGREES}
 
 
@@ -123,19 +125,94 @@ def _no_space(*_, **__):
 
 
 def test_archives_may_hold_binaries_more_and_nothing_else(tmp_path):
-    def archive(members):
-        path = tmp_path / "a.fmu"
+    path = tmp_path / "a.fmu"
+
+    def archive(*members):
         with zipfile.ZipFile(path, "w") as file:
-            for name, content in members.items():
+            for name, content in members:
                 file.writestr(name, content)
         return path.read_bytes()
 
-    source = archive({"modelDescription.xml": "<a/>"})
-    assert exporting._same(archive({"modelDescription.xml": "<a/>", "binaries/x/a.so": "b"}), source)
-    assert not exporting._same(archive({"modelDescription.xml": "<a/>", "resources/a": "b"}), source)
-    assert not exporting._same(archive({"modelDescription.xml": "<b/>"}), source)
-    assert not exporting._same(archive({"binaries/x/a.so": "b"}), source)
-    assert not exporting._same(b"no archive", source)
+    described, library = ("modelDescription.xml", "<a/>"), ("binaries/x/a.so", "b")
+    source = archive(described)
+    for members, same in (
+        ([described, library], True),
+        ([described, ("resources/a", "b")], False),
+        ([("modelDescription.xml", "<b/>")], False),
+        ([("modelDescription.xml", "<a/>" + 10**6 * " ")], False),
+        ([library], False),
+    ):
+        archive(*members)
+        assert exporting._same(path, source) is same, members
+    with pytest.warns(UserWarning, match="Duplicate name"):
+        archive(described, described)
+    assert not exporting._same(path, source)
+    path.write_bytes(b"no archive")
+    assert not exporting._same(path, source)
+
+
+def test_a_manifest_without_files_is_no_proof(folder):
+    manifest = json.loads((folder / "export.json").read_text(encoding="utf-8")) | {"files": {}}
+    (folder / "export.json").write_text(json.dumps(manifest), encoding="utf-8")
+    found = exporting.verified(folder)
+    assert found[1].outcome is Outcome.DIFFERS
+    assert "not what the model gives: dev.c, dev.h, dev_selftest.c" in found[1].detail
+
+
+def test_force_removes_only_what_an_export_left(text, folder):
+    (folder / "thesis.tex").write_text("mine", encoding="utf-8")
+    manifest = json.loads((folder / "export.json").read_text(encoding="utf-8"))
+    manifest["files"]["thesis.tex"] = "00"
+    (folder / "export.json").write_text(json.dumps(manifest), encoding="utf-8")
+    (folder / "dev.h").write_text("changed by hand", encoding="utf-8")
+    exporting.write(folder, exporting.generate(text, "c99", "stem", {})[0], force=True)
+    left = {p.name for p in folder.iterdir()}
+    assert left == {"thesis.tex", "dev.h", "stem.c", "stem.h", "stem_selftest.c", "model.json", "export.json"}
+
+
+def test_links_are_replaced_not_followed(text, folder, tmp_path):
+    victim = tmp_path / "victim"
+    victim.write_text("mine", encoding="utf-8")
+    for name in ("verification.csv", "dev.h", "dev.h.partial"):
+        (folder / name).unlink(missing_ok=True)
+        (folder / name).symlink_to(victim)
+    exporting.write(folder, exporting.generate(text, "c99", "dev", {})[0], force=True)
+    (folder / "verification.csv").unlink(missing_ok=True)
+    (folder / "verification.csv").symlink_to(victim)
+    exporting._keep(folder, [])
+    assert victim.read_text(encoding="utf-8") == "mine"
+    assert not (folder / "dev.h").is_symlink()
+
+
+def test_a_pipe_in_place_of_a_file_does_not_hang(folder):
+    import os
+
+    (folder / "dev.c").unlink()
+    os.mkfifo(folder / "dev.c")
+    assert outcomes(folder) == {"dev.c as written": Outcome.DIFFERS}
+
+
+@needs_compiler
+def test_a_foreign_library_in_an_fmu_is_not_loaded(text, tmp_path):
+    pytest.importorskip("fmpy", reason="FMPY IS NOT INSTALLED: FMUs were not verified")
+    import hashlib
+
+    files, _ = exporting.generate(text, "fmi3", "dev", {})
+    exporting.write(tmp_path, files)
+    path = tmp_path / "dev_forward.fmu"
+    with zipfile.ZipFile(path) as archive:
+        members = {m.filename: archive.read(m) for m in archive.infolist()}
+    binary = next(name for name in members if name.startswith("binaries/"))
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in members.items():
+            archive.writestr(name, b"no library at all" if name == binary else content)
+    manifest = json.loads((tmp_path / "export.json").read_text(encoding="utf-8"))
+    manifest["files"][path.name] = hashlib.sha256(path.read_bytes()).hexdigest()
+    (tmp_path / "export.json").write_text(json.dumps(manifest), encoding="utf-8")
+    found = {f.what: f for f in exporting.verified(tmp_path)}
+    assert found["dev_forward.fmu: its library"].outcome is Outcome.NOT_CHECKED
+    assert found["dev_forward.fmu: responses"].outcome is Outcome.AGREES
+    assert found["dev_inverse.fmu: its library"].outcome is Outcome.AGREES
 
 
 def test_every_target_has_a_verifier():

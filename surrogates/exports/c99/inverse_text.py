@@ -1,7 +1,7 @@
 """The fixed text of the C99 export's inverse, one search for each kind of plan, and the function that ends all."""
 
 CHECK = """
-/* Whether settings answer for the responses$in_link_units. If they do, rounding beyond the ranges is taken off. */
+/* Whether settings, rounding beyond the ranges taken off, answer for the responses$in_link_units. */
 static int ${p}_check(const $real responses[${P}_N_RESPONSES], $real settings[${P}_N_FACTORS])
 {
     static const $real low[${P}_N_FACTORS] = {$low};
@@ -9,20 +9,20 @@ static int ${p}_check(const $real responses[${P}_N_RESPONSES], $real settings[${
     static const $real tolerance[${P}_N_RESPONSES] = {$tolerance};
     $real coded[${P}_N_FACTORS];
     $real reached[${P}_N_RESPONSES];
-    const int status = ${p}_code(settings, coded);
 
-    if (status != ${P}_OK) {
+    if (${p}_code(settings, coded) != ${P}_OK) {
         return ${P}_OUTSIDE_DOMAIN;
     }
+    for (int j = 0; j < ${P}_N_FACTORS; ++j) {
+        settings[j] = settings[j] < low[j] ? low[j] : settings[j] > high[j] ? high[j] : settings[j];
+    }
+    (void)${p}_code(settings, coded);
     ${p}_value(coded, reached);
     for (int i = 0; i < ${P}_N_RESPONSES; ++i) {
         const $real miss = reached[i] - responses[i];
         if (!(miss <= tolerance[i] && miss >= -tolerance[i])) {
             return ${P}_UNREACHABLE;
         }
-    }
-    for (int j = 0; j < ${P}_N_FACTORS; ++j) {
-        settings[j] = settings[j] < low[j] ? low[j] : settings[j] > high[j] ? high[j] : settings[j];
     }
     return ${P}_OK;
 }
@@ -178,14 +178,16 @@ static void ${p}_least_norm($real slope[${P}_N_RESPONSES][${P}_N_FACTORS],
             return;
         }
         done[row] = 1;
+        square = $one / square;
         for (int j = 0; j < ${P}_N_FACTORS; ++j) {
-            step[j] += miss[row] / square * slope[row][j];
+            step[j] += miss[row] * square * slope[row][j];
         }
         for (int i = 0; i < ${P}_N_RESPONSES; ++i) {
             $real along = $zero;
             for (int j = 0; j < ${P}_N_FACTORS; ++j) {
-                along += slope[i][j] * slope[row][j] / square;
+                along += slope[i][j] * slope[row][j];
             }
+            along *= square;
             if (!done[i]) {
                 miss[i] -= along * miss[row];
                 for (int j = 0; j < ${P}_N_FACTORS; ++j) {

@@ -24,28 +24,35 @@ def operations(parts: "Parts") -> list[str]:
 
 def forward(parts: "Parts") -> Counts:
     """Of ``forward``: coding the settings, and the polynomials."""
-    n, one = len(parts.model.factors), parts.forward.count(slopes=False)
-    return one.multiplications + n, one.additions + n, 0
+    coding, one = _coding(parts), parts.forward.count(slopes=False)
+    return one.multiplications + coding[0], one.additions + coding[1], 0
+
+
+def _coding(parts: "Parts") -> Counts:
+    """Of the settings; in single precision the centre is taken off in two parts where one cannot hold it."""
+    rests = sum(parts.rest_of(c) != 0.0 for c in parts.model.factors.centre)
+    return len(parts.model.factors), len(parts.model.factors) + rests, 0
 
 
 def with_jacobian(parts: "Parts") -> Counts:
     """Of ``forward_jacobian``; an affine map's Jacobian is constant."""
-    if parts.model.is_affine_map:
+    if parts.constant_slope:
         return forward(parts)
     n, m, one = len(parts.model.factors), len(parts.model.responses), parts.forward.count(slopes=True)
     chained = n * sum(link != "identity" for link in parts.model.links)
-    return one.multiplications + n + n * m + chained, one.additions + n, 0
+    coding = _coding(parts)
+    return one.multiplications + coding[0] + n * m + chained, one.additions + coding[1], 0
 
 
 def inverse(parts: "Parts") -> Counts:
     """Of ``inverse`` when it takes all the steps that it may: the first one, the others, and the check."""
     n, m = len(parts.model.factors), len(parts.model.responses)
-    gain, check = int((parts.plan.gain != 0.0).sum()), forward(parts)
+    gain, check, again = int((parts.plan.gain != 0.0).sum()), forward(parts), _coding(parts)
     step, plan = _step(parts), parts.plan
     chord = parts.moved.count(slopes=False) if parts.moved else (0, 0)
     return (
-        gain + n + check[0] + plan.steps * step[0] + plan.chords * chord[0],
-        gain + m + n + check[1] + m + plan.steps * step[1] + plan.chords * (chord[1] + 2 * n),
+        gain + n + check[0] + again[0] + plan.steps * step[0] + plan.chords * chord[0],
+        gain + m + n + check[1] + again[1] + m + plan.steps * step[1] + plan.chords * (chord[1] + 2 * n),
         check[2] + plan.steps * step[2],
     )
 
@@ -63,7 +70,7 @@ def _step(parts: "Parts") -> Counts:
         return one.multiplications + eliminated + substituted, one.additions + inner + 2 * n, n
     one, rank = parts.forward.count(slopes=True), min(n, m)
     # Gram–Schmidt: for each row taken, all squares, then the step and the other rows without their share.
-    per_row = (m * n + n + m * 2 * n + m, m * n + n + m * 2 * n + m, 1 + m * n)
+    per_row = (m * n + 2 * n + m * (2 * n + 2), m * n + n + m * (2 * n + 1), 1)
     scaled = m + m * n
     return (
         one.multiplications + scaled + rank * per_row[0],

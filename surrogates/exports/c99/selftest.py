@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ...inversion import obstacle
 from ..verification.base import Reference, reaches_all, reference
-from .precision import Precision
+from .precision import Precision, tolerance
 
 if TYPE_CHECKING:
     from ...model import Surrogate
@@ -144,12 +144,11 @@ def selftest(model: "Surrogate", prefix: str, precision: Precision) -> str:
     given = reference(model, N_RANDOM)
     settings = _held(given, precision)
     expected, slopes = model.predict(settings), model.jacobian(settings)
+    miss = tolerance(model, precision) / model.scale
     inverse = {
         "targets": c.table(given.targets),
         "least_found": str(len(settings)) if reaches_all(model) else "1",
-        "reached": c.table(
-            2.0 * precision.target * _span(model, given.targets) + precision.agreement * given.magnitude
-        ),
+        "reached": c.table(2.0 * _span(model, given.targets) * miss + precision.agreement * given.magnitude),
     }
     tables, ending = "", ""
     if not obstacle(model):

@@ -14,11 +14,15 @@ from ..inverse_plan import InversePlan, inverse_plan
 from . import inverse_text as inverse_text
 from . import text as text
 from .polynomials import Polynomials, body, columns_text, polynomials, table_text
-from .precision import Precision
+from .precision import Precision, box, tolerance
 from .printing import affine_sum
 
 if TYPE_CHECKING:
     from ...model import Surrogate
+
+
+SINGLE_REACH, SINGLE_MISS, SINGLE_EXPONENT = 2e3, 1.1e-3, 85.0
+"""Largest centre over half-range, mismatch over scale and exponent that single precision is trusted with."""
 
 
 def logged(model: "Surrogate") -> list[int]:
@@ -44,6 +48,8 @@ class Parts:
         self.names = {"p": prefix, "P": prefix.upper(), "real": precision.printer.real}
         self.plan: InversePlan = inverse_plan(model, max_iterations)
         self.has_inverse = not obstacle(model)
+        if precision.ending:
+            _check_single(model, tolerance(model, precision) / model.scale)
 
     @cached_property
     def forward(self) -> Polynomials:
@@ -67,7 +73,7 @@ class Parts:
 
     def source(self) -> str:
         """The text of the source file."""
-        jacobian = text.CONSTANT_JACOBIAN if self.model.is_affine_map else text.JACOBIAN
+        jacobian = text.CONSTANT_JACOBIAN if self.constant_slope else text.JACOBIAN
         template = text.SOURCE + text.FORWARD + jacobian
         values = {**self.names, **self._common(), **self._logarithms()}
         if self.has_inverse:
@@ -75,17 +81,19 @@ class Parts:
             values |= self._inverse()
         return Template(template).substitute(values)
 
-    def box(self) -> float:
-        """How far from 0 a coded setting counts as inside: in single precision the ranges' own rounding is more."""
-        factors = self.model.factors
-        ends = np.maximum(np.abs([f.low for f in factors]), np.abs([f.high for f in factors]))
-        rounding = 4.0 * float(np.finfo(np.float32).eps) * float((ends / factors.half_range).max())
-        return 1.0 + max(self.precision.box, rounding if self.precision.ending else 0.0)
+    @property
+    def constant_slope(self) -> bool:
+        """Whether the code has the Jacobian as numbers: nothing evaluates it, the inverse neither."""
+        return self.model.is_affine_map and self.plan.affine
 
-    def tolerance(self) -> NDArray[np.float64]:
-        """Largest mismatch of a reached target, link units; in single precision, no less than the target's rounding."""
-        rounding = 4.0 * np.finfo(np.float32).eps * np.abs(self.plan.constant) if self.precision.ending else 0.0
-        return self.precision.target * self.model.scale + rounding
+    @property
+    def accuracy(self) -> float:
+        """Largest mismatch of a reached target, in units of the scale."""
+        return float((tolerance(self.model, self.precision) / self.model.scale).max())
+
+    def rest_of(self, centre: float) -> float:
+        """What single precision leaves of a factor's centre."""
+        return float(centre) - float(np.float32(centre)) if self.precision.ending else 0.0
 
     def _search(self) -> str:
         if self.plan.affine:
@@ -101,12 +109,12 @@ class Parts:
             "largest": c.limit,
             "tables": self._tables(),
             "coding": self._coding(),
-            "box": c.number(self.box()),
+            "box": c.number(box(self.model, self.precision)),
             "polynomials": body(self.forward, table, columns, c, slopes=False),
             "values": "Responses, of some the logarithm," if model.has_logs else "Responses",
             "value": "response (of some: d logarithm)" if model.has_logs else "response",
         }
-        if model.is_affine_map:
+        if self.constant_slope:
             slope = model.jacobian(model.factors.centre[None])[0]
             return values | {
                 "slope": "\n".join(f"    jacobian[{j}][{i}] = {c.number(v)};" for (j, i), v in np.ndenumerate(slope))
@@ -130,7 +138,7 @@ class Parts:
             zip(self.model.factors, self.model.factors.centre, self.model.factors.half_range, strict=True)
         ):
             moved = c.difference(f"settings[{i}]", centre)
-            if self.precision.ending and (rest := float(centre) - float(np.float32(centre))):
+            if rest := self.rest_of(centre):
                 moved = c.difference(f"({moved})", rest)  # what single precision leaves of the centre
             moved = f"({moved})" if " " in moved else moved
             lines.append(f"    coded[{i}] = {moved} * {c.number(1.0 / half)}; /* {factor.name} */")
@@ -170,7 +178,7 @@ class Parts:
         return {
             "low": c.list([f.low for f in model.factors]),
             "high": c.list([f.high for f in model.factors]),
-            "tolerance": c.list(self.tolerance()),
+            "tolerance": c.list(tolerance(self.model, self.precision)),
             "moves": self._moves(),
             "decoding": "\n".join(
                 f"    settings[{i}] = {c.sum(affine_sum(centre, [half], [name]), ' ' * 8)};"
@@ -208,3 +216,22 @@ class Parts:
             for i, (row, factor) in enumerate(zip(gain, self.model.factors, strict=True))
         ]
         return "\n".join([*lines, *unused, "", *rows])
+
+
+def _check_single(model: "Surrogate", accuracy: NDArray[np.float64]) -> None:
+    """Raise ``ValueError`` if seven digits are too few for the model's ranges."""
+    use = "use the double-precision target c99"
+    for factor, centre, half in zip(model.factors, model.factors.centre, model.factors.half_range, strict=True):
+        if abs(centre) > SINGLE_REACH * half:
+            raise ValueError(
+                f"this model cannot be exported in single precision: the range of {factor.name!r} is too narrow about "
+                f"{centre:.6g} for seven digits; {use}"
+            )
+    constant = model.predict_coded(np.zeros((1, len(model.factors))))[0]
+    for response, link, value, scale, miss in zip(
+        model.responses, model.links, constant, model.scale, accuracy, strict=True
+    ):
+        lost = link == LOG and abs(value) + scale > SINGLE_EXPONENT
+        if lost or miss > SINGLE_MISS:
+            why = "spans more than float32 can hold" if lost else "changes too little beside its size for seven digits"
+            raise ValueError(f"this model cannot be exported in single precision: {response.name!r} {why}; {use}")

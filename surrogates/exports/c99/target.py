@@ -74,7 +74,9 @@ class C99:
 class C99Float(C99):
     """The same in single precision, for processors whose hardware has no other; names end in ``_float``.
 
-    Settings count as inside to 1e-6 of the half-ranges, and targets as reached to 1e-5 of the responses' scale.
+    Settings count as inside to 1e-6 of the half-ranges, and targets as reached to 1e-5 of the responses' scale, or to
+    what seven digits allow where a response changes little beside its size: the header says to what. Models for which
+    that is too little are refused.
     """
 
     name: ClassVar[str] = "c99_float"
@@ -104,7 +106,7 @@ def _header(parts: Parts) -> str:
             names,
             obstacle=textwrap.indent(textwrap.fill(f"There is no inverse: {against}.", WIDTH), " * "),
             inverse_note=_note(parts),
-            accuracy=f"{parts.precision.target:g}",
+            accuracy=f"{parts.accuracy:.1g}",
             of_logarithms=f",\n * of {logs} in logarithms" if logs else "",
         ),
     )

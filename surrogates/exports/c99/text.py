@@ -12,7 +12,7 @@ $about
  * Settings are in the factors' units and responses in the units above; nothing is rescaled. All numbers are
  * of type $real. No heap, no globals that change, no recursion; $libraries.
 $logarithms *
- * Most operations of one call, whatever the arguments:
+ * Most operations of one call, whatever the arguments, zeros that fill vectors aside:
 $operations
  *
  * Example:
@@ -103,9 +103,11 @@ AFFINE_NOTE = """\
 
 CERTIFIED_NOTE = """\
  * Iterative: one step from the centre of the domain and at most $steps Newton steps, each clipped to the
- * domain$chords. The certificate proves that these suffice for every target that the domain can give."""
+ * domain$chords.
+ * The certificate proves that these suffice for every target that the domain can give."""
 
-CHORDS_NOTE = """; if they do not converge, $count chord steps"""
+CHORDS_NOTE = """; if they do not converge,
+ * $count chord steps follow"""
 
 FREE_NOTE = """\
  * Iterative: one step from the centre of the domain and at most $steps Gauss-Newton steps of least norm. Where
@@ -209,8 +211,13 @@ $slope
 int ${p}_forward_jacobian(const $real settings[${P}_N_FACTORS], $real responses[${P}_N_RESPONSES],
     $real jacobian[${P}_N_RESPONSES][${P}_N_FACTORS])
 {
-    (void)${p}_jacobian(settings, jacobian);
-    return ${p}_forward(settings, responses);
+    const int status = ${p}_forward(settings, responses);
+
+    if (status == ${P}_NOT_FINITE) {
+        return status;
+    }
+$slope
+    return status;
 }
 """
 

@@ -124,7 +124,7 @@ END_IF;
 """
 
 CHECK = """\
-(* Whether they lie in the domain and give the responses; then rounding beyond the ranges is taken off. *)
+(* Whether they lie in the domain, and, rounding beyond the ranges taken off, give the responses. *)
 FOR j := 0 TO $n1 DO
     found[j] := centre[j] + half[j] * coded[j];
 END_FOR;
@@ -133,6 +133,14 @@ IF domain.status <> 0 THEN
     status := 1;$not_moving
     RETURN;
 END_IF;
+FOR j := 0 TO $n1 DO
+    IF found[j] < low[j] THEN
+        found[j] := low[j];
+    ELSIF found[j] > high[j] THEN
+        found[j] := high[j];
+    END_IF;
+END_FOR;
+domain(settings := found);
 polynomials(coded := domain.coded);
 FOR i := 0 TO $m1 DO
     IF NOT (ABS(polynomials.value[i] - wanted[i]) <= tolerance[i]) THEN
@@ -140,15 +148,7 @@ FOR i := 0 TO $m1 DO
         RETURN;
     END_IF;
 END_FOR;
-FOR j := 0 TO $n1 DO
-    IF found[j] < low[j] THEN
-        settings[j] := low[j];
-    ELSIF found[j] > high[j] THEN
-        settings[j] := high[j];
-    ELSE
-        settings[j] := found[j];
-    END_IF;
-END_FOR;
+settings := found;
 status := 0;
 END_FUNCTION_BLOCK
 """

@@ -150,14 +150,15 @@ status(~all(isfinite(wanted), 2)) = 4;$logarithms
 wanted(status ~= 0, :) = 0;
 coded = (wanted - constant) * gain.';
 $search
-% Good if they lie in the domain and give the responses; then rounding beyond the ranges is taken off.
+% Good if they lie in the domain and, rounding beyond the ranges taken off, give the responses.
 settings = centre + half .* coded;
-[place, coded] = ${p}_inside(settings);
+place = ${p}_inside(settings);
+settings = min(max(settings, low), high);
+[~, coded] = ${p}_inside(settings);
 failed = zeros(n, 1);
 failed(any(~(abs(${p}_polynomials(coded) - wanted) <= tolerance), 2)) = 2;
 failed(place ~= 0) = 1;$not_converged
 status(status == 0) = failed(status == 0);
-settings = min(max(settings, low), high);
 settings(status ~= 0, :) = NaN;
 end
 """

@@ -218,13 +218,13 @@ def _search(wanted):
     """Settings for finite values of the polynomials, NaN where refused, and the status of each row."""
     x, converged = _solved(wanted)
     settings = CENTRE + x * HALF_RANGE
-    x = _coded(settings)
-    in_box = (np.abs(x) <= BOX).all(axis=1)
-    reached = (np.abs(_values(x) - wanted) <= TOLERANCE).all(axis=1)
+    in_box = (np.abs(_coded(settings)) <= BOX).all(axis=1)
+    # What rounding put beyond the ranges is taken off, and the answer is judged by what is left.
+    settings = np.clip(settings, [f.low for f in FACTORS], [f.high for f in FACTORS])
+    reached = (np.abs(_values(_coded(settings)) - wanted) <= TOLERANCE).all(axis=1)
     status = np.select([in_box & reached, ~converged, ~in_box], [OK, NOT_CONVERGED, OUTSIDE_DOMAIN], UNREACHABLE)
     settings[status != OK] = np.nan
-    # What rounding put beyond the ranges is taken off.
-    return np.clip(settings, [f.low for f in FACTORS], [f.high for f in FACTORS]), status
+    return settings, status
 
 
 def _times(matrix, vectors):

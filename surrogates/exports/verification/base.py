@@ -176,7 +176,7 @@ def reaches_all(model: "Surrogate") -> bool:
     known = model.certificate
     if known is None or known.verdict is not Verdict.CERTIFIED:
         return False
-    return model.is_affine or inverse_plan(model, 1).certified
+    return inverse_plan(model, 1).certified
 
 
 def tool(*names: str) -> str | None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..c99.precision import DOUBLE, SINGLE, Precision
+from ..c99.precision import DOUBLE, SINGLE, Precision, tolerance
 from .base import Finding, Outcome, agreement, invertible, not_checked, reference, round_trip, run_tool, statement, tool
 
 if TYPE_CHECKING:
@@ -120,9 +120,13 @@ def _points(
     ]
     if invertible(model):
         ok = taken["inverse_status"] == 0
-        # In single precision settings are rounded on their way out, and the response follows.
-        rounding = 1e-5 if precision.ending else 0.0
+        # In single precision an end of a range is rounded, perhaps outwards, and the response is told in seven digits.
+        miss = float((tolerance(model, precision) / model.scale).max())
         held = np.clip(taken["inverse"], [f.low for f in model.factors], [f.high for f in model.factors])
         found = held if precision.ending else taken["inverse"]
-        findings.append(round_trip(model, f"{label}: inverse of {n} targets", targets, found, ok, 4.0 * rounding))
+        findings.append(
+            round_trip(
+                model, f"{label}: inverse of {n} targets", targets, found, ok, 4.0 * miss if precision.ending else 0.0
+            )
+        )
     return findings

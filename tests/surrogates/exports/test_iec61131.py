@@ -346,7 +346,7 @@ def _words(source: str) -> list[tuple[str, str]]:
         ("settings[i] >= -1.79E+308", "TRUE", "NaN and infinite settings"),
         ("status := 4;", "status := 4;\n        coded[0] := 0.0;\n        status := 0;", "NaN and infinite settings"),
         ("constant_part : ARRAY [0..2] OF LREAL := [", "constant_part : ARRAY [0..2] OF LREAL := [1.0, ", "grammar"),
-        ("settings[j] := found[j];", "settings[j] := found[j] + 1.0E-3;", "inverse"),
+        ("settings := found;", "settings := found; settings[0] := settings[0] + 1.0E-3;", "inverse"),
         ("ABS(polynomials.value[i] - wanted[i]) <= tolerance[i]", "TRUE", "a target beyond"),
         ("END_FUNCTION_BLOCK", "END_FUNCTION", "grammar"),
         ("rest[j] := 0.0;", "", "inverse runs"),
