@@ -1,12 +1,14 @@
 """The command line: parses arguments, calls the pipeline, prints. Every error is one sentence and an exit code."""
 
 import argparse
+import signal
 import sys
 from collections.abc import Callable, Sequence
 
 from . import commands
 from .compilation import keep_compiled
 from .errors import FlexdoceError
+from .points import FAILURES
 from .version import __version__
 
 EPILOG = (
@@ -31,9 +33,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"flexdoce: {error.filename or 'the disk'}: {error.strerror}; run the same command to continue",
               file=sys.stderr)  # fmt: skip
         return 1
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
         print("flexdoce: stopped; run the same command to continue, no answer that came in is lost", file=sys.stderr)
-        return 130
+        return 128 + (stop.args[0] if stop.args and isinstance(stop.args[0], int) else signal.SIGINT)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -61,16 +63,30 @@ def _parser() -> argparse.ArgumentParser:
                          help="replace a setting, such as fit.degree=3; repeatable")  # fmt: skip
         if name == "run":
             sub.add_argument("--out", metavar="DIR", help="run folder (default: runs/<name of the study>)")
-            sub.add_argument("--fresh", action="store_true", help="start anew in a folder that was used before")
+            _add_survival(sub)
 
     sub = verb("report", commands.report, "write report.html of a run folder again; runs nothing")
     sub.add_argument("folder", metavar="RUN_DIR")
+
+    sub = verb("status", commands.status, "say where a run is, from another terminal; changes nothing")
+    sub.add_argument("folder", metavar="RUN_DIR")
+    sub.add_argument("--watch", action="store_true", help="say it again every two seconds until the run ends")
 
     _add_tables(verb)
 
     _add_exports(verb)
     verb("list", commands.list_known, "list oracles, designs and export targets with their settings")
     return parser
+
+
+def _add_survival(sub: argparse.ArgumentParser) -> None:
+    """How ``run`` treats what was answered before."""
+    sub.add_argument("--fresh", action="store_true", help="start anew in a folder that was used before")
+    sub.add_argument("--cache", metavar="DIR", help="folder of points that studies share: none is paid for twice")
+    kinds = [str(status) for status in FAILURES]
+    sub.add_argument("--retry-failed", action="store_true", help="run again every point that failed before")
+    sub.add_argument("--retry", action="append", default=[], choices=kinds, metavar="KIND",
+                     help=f"run again the points that failed so: {', '.join(kinds)}; repeatable")  # fmt: skip
 
 
 def _add_exports(verb: Callable[[str, object, str], argparse.ArgumentParser]) -> None:

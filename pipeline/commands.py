@@ -1,6 +1,7 @@
 """What each command does. Each takes the parsed arguments and returns an exit code, or None for 0."""
 
 import sys
+import time
 from argparse import Namespace
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from experiments import designs, oracles, settings
+from experiments.runs import Status
 from surrogates import Inversion, Surrogate, exports, load, obstacle
 from surrogates.domain import outside_sentence
 from surrogates.exports.verification import Finding, Outcome
@@ -16,11 +18,17 @@ from surrogates.preimages import Preimages
 
 from . import exporting, tables
 from .config import assignments, dump_config, load_config
-from .console import console, design_table, print_findings, progress_bars, summary
-from .errors import InputError, RequirementNotMet
+from .console import console, design_table, print_findings, print_status, progress_bars, summary
+from .errors import InputError, RequirementNotMet, TooManyFailures
+from .points import FAILURES
 from .reading import read_points
+from .signals import ended_like_ctrl_c
+from .status import read_status
 from .store import RunFolder
 from .study import resolve
+
+WATCH_EVERY = 2.0
+"""Seconds between two looks of ``flexdoce status --watch``."""
 
 MORE_FACTORS = "there are more factors than responses that follow independently, or one acts on none"
 
@@ -29,8 +37,14 @@ def run(arguments: Namespace) -> int | None:
     """``flexdoce run``."""
     from .runner import run as run_study
 
-    with progress_bars() as progress:
-        outcome = run_study(arguments.config, arguments.out, arguments.overrides, arguments.fresh, progress)
+    retry = FAILURES if arguments.retry_failed else [Status(kind) for kind in arguments.retry]
+    try:
+        with ended_like_ctrl_c(), progress_bars() as progress:
+            outcome = run_study(
+                arguments.config, arguments.out, arguments.overrides, arguments.fresh, progress, arguments.cache, retry
+            )
+    except TooManyFailures as error:
+        raise TooManyFailures(f"{error}; they are kept as answers: --retry-failed runs them again") from None
     summary(outcome)
     if outcome.shortfalls:
         raise RequirementNotMet("required but not met: " + "; ".join(outcome.shortfalls))
@@ -41,6 +55,11 @@ def check(arguments: Namespace) -> None:
     """``flexdoce check``."""
     study = resolve(load_config(arguments.config, arguments.overrides))
     print(dump_config(study.config), end="")
+    openly: Any = getattr(study.oracle, "openly", None)
+    if openly:  # a program: what would be run, as comments, so that the whole stays a config
+        print("\n# Nothing was run. The first point of the screening:")
+        for line in openly(study.screening_design.physical[0]):
+            print(f"# {line}")
 
 
 def plan(arguments: Namespace) -> None:
@@ -74,6 +93,20 @@ def report(arguments: Namespace) -> None:
 
     folder, _ = RunFolder.existing(Path(arguments.folder))
     print(write_report(folder, read_run(arguments.folder)))
+
+
+def status(arguments: Namespace) -> None:
+    """``flexdoce status``."""
+    folder, _ = RunFolder.existing(Path(arguments.folder))
+    found = read_status(folder)
+    print_status(found)
+    try:
+        while arguments.watch and found.owner:
+            time.sleep(WATCH_EVERY)
+            found = read_status(folder)
+            print_status(found, again=True)
+    except KeyboardInterrupt:
+        pass  # the watching ends, not the run
 
 
 def predict(arguments: Namespace) -> None:
@@ -146,7 +179,7 @@ def export(arguments: Namespace) -> None:
     if arguments.to is None or arguments.out is None:
         raise InputError("an export needs --to NAME (flexdoce export lists the names) and --out DIR")
     model = _model(arguments.model)
-    names = list(exports.TARGETS) if arguments.to == "all" else arguments.to.split(",")
+    names = list(exports.TARGETS) if arguments.to == "all" else list(dict.fromkeys(arguments.to.split(",")))
     for name in names:
         _target(name)
     text = Path(arguments.model).read_text(encoding="utf-8")
@@ -154,7 +187,7 @@ def export(arguments: Namespace) -> None:
     settings = assignments(arguments.overrides)
     if settings and len(names) > 1:
         raise InputError("--set needs a single target: settings belong to one")
-    out, refused = Path(arguments.out), []
+    out, refused, differing = Path(arguments.out), [], []
     for name in names:
         try:
             files, notes = exporting.generate(text, name, prefix, settings)
@@ -169,27 +202,27 @@ def export(arguments: Namespace) -> None:
         for note in notes:
             _warn(note)
         if arguments.verify:
-            _report_findings(name, exporting.verified(folder))
+            differing += _reported(name, exporting.verified(folder))
     if refused:
         raise InputError("not exported: " + "; ".join(refused))
+    if differing:
+        raise RequirementNotMet("; ".join(differing))
 
 
 def verify(arguments: Namespace) -> None:
     """``flexdoce verify``."""
     differing = []
     for folder in exporting.folders(Path(arguments.folder)):
-        try:
-            _report_findings(str(folder), exporting.verified(folder))
-        except RequirementNotMet as error:
-            differing.append(str(error))
+        differing += _reported(str(folder), exporting.verified(folder))
     if differing:
         raise RequirementNotMet("; ".join(differing))
 
 
-def _report_findings(where: str, findings: list[Finding]) -> None:
+def _reported(where: str, findings: list[Finding]) -> list[str]:
+    """Print what the checks of one export found; a sentence if it is not what its model says."""
     print_findings(where, findings)
-    if wrong := [f for f in findings if f.outcome is Outcome.DIFFERS]:
-        raise RequirementNotMet(f"{where} is not what its model says: {wrong[0].what}: {wrong[0].detail}")
+    wrong = [f for f in findings if f.outcome is Outcome.DIFFERS]
+    return [f"{where} is not what its model says: {wrong[0].what}: {wrong[0].detail}"] if wrong else []
 
 
 def _target(name: str) -> None:
@@ -202,7 +235,7 @@ def _target(name: str) -> None:
 def list_known(arguments: Namespace) -> None:
     """``flexdoce list``."""
     for title, known in (
-        ("oracles", {name: oracles.oracle_class(name) for name in oracles.names()}),
+        ("oracles", {name: oracles.oracle_class(name) for name in (*oracles.names(), *oracles.CONFIGURED)}),
         ("designs", designs.METHODS),
         ("exports", exports.TARGETS),
     ):

@@ -3,7 +3,7 @@
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -12,16 +12,8 @@ from experiments.naming import suggestion
 from surrogates.candidates import HIGHEST
 
 from .errors import InputError
-
-Number = Annotated[float, Field(allow_inf_nan=False)]
-Whole = Annotated[int, Field(ge=-(2**63), le=2**63 - 1)]
-Setting = bool | Whole | Number | str
-
-
-class Table(BaseModel):
-    """A TOML table: frozen, strictly typed, and closed to unknown keys."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+from .programs import ProgramTable, embedded
+from .strict import Number, Setting, Table
 
 
 class FactorRange(Table):
@@ -66,6 +58,7 @@ class OracleTable(Table):
     max_failed_fraction: float = Field(
         default=0.0, ge=0.0, le=1.0, description="failed runs tolerated in the fit and the validation"
     )
+    command: ProgramTable | None = Field(default=None, description="the program, for name = 'command'")
 
 
 class ScreeningTable(Table):
@@ -189,7 +182,12 @@ def load_config(path: str | Path, overrides: Sequence[str] = ()) -> Config:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
         raise InputError(f"cannot read the config {path}: {reason}") from None
-    return parse_config(text, str(path), overrides)
+    config = parse_config(text, str(path), overrides)
+    if config.oracle.command is None:
+        return config
+    # With the texts of its templates a config says all that it needs, wherever it is copied to.
+    program = embedded(config.oracle.command, Path(path).parent, str(path))
+    return config.model_copy(update={"oracle": config.oracle.model_copy(update={"command": program})})
 
 
 def parse_config(text: str, origin: str = "config", overrides: Sequence[str] = ()) -> Config:
@@ -285,14 +283,16 @@ def _known_keys(location: Sequence[Any]) -> list[str]:
     """Keys of the table at `location`."""
     model: Any = Config
     for part in location:
-        hint = model.model_fields[part].annotation if part in getattr(model, "model_fields", {}) else None
-        if isinstance(hint, type) and issubclass(hint, BaseModel):
-            model = hint
-        elif part == "factors":
-            model = Config.model_fields["factors"]
-        elif not isinstance(model, type):
-            model = FactorRange
+        field = getattr(model, "model_fields", {}).get(part)
+        # Below a table of tables, such as factors, comes a name first: the part after it is what has keys.
+        model = _model_in(field.annotation) if field else model
     return list(getattr(model, "model_fields", {}))
+
+
+def _model_in(hint: Any) -> Any:
+    """The table that a type hint speaks of: itself, or what an optional one or a table of tables holds."""
+    inner = [_model_in(part) for part in get_args(hint)]
+    return next((m for m in (hint, *inner) if isinstance(m, type) and issubclass(m, BaseModel)), None)
 
 
 def differences(ours: Config, theirs: Config) -> list[str]:

@@ -1,6 +1,7 @@
 """What a person sees in a terminal: progress bars, tables, the summary at the end."""
 
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
@@ -16,41 +17,82 @@ from surrogates.exports.verification import Outcome as Verified
 
 from .executors import Progress as Told
 from .runner import Outcome
+from .status import Standing
+from .tally import Tally, failures
 
 console = Console(highlight=False)
 _errors = Console(stderr=True, highlight=False)
 
 
+LINE_EVERY = 30.0
+"""Seconds between two lines of a stage, where there is no terminal."""
+
+
 @contextmanager
 def progress_bars() -> Iterator[Told]:
-    """One bar per stage on standard error; plain lines where that is no terminal."""
+    """One bar per stage on standard error, with failures, rate and time left; plain lines where that is no terminal."""
     if not _errors.is_terminal:
-        yield _lines()
+        yield _Lines()
         return
     columns = (SpinnerColumn(finished_text="✓"), TextColumn("{task.description:<12}"), BarColumn(bar_width=32),
-               MofNCompleteColumn(), TimeElapsedColumn())  # fmt: skip
-    tasks: dict[str, TaskID] = {}
+               MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.fields[pace]}", markup=False))  # fmt: skip
     with Progress(*columns, console=_errors) as bars:
-
-        def told(stage: str, done: int, total: int) -> None:
-            if stage not in tasks:
-                tasks[stage] = bars.add_task(stage, total=total or None)
-            bars.update(tasks[stage], completed=done, total=total or None)
-
-        yield told
+        yield _Bars(bars)
 
 
-def _lines() -> Told:
-    """One line per finished stage, for a log; says how many runs were known from before."""
-    known: dict[str, int] = {}
+class _Bars:
+    """A bar per stage."""
 
-    def told(stage: str, done: int, total: int) -> None:
-        before = known.setdefault(stage, done)
-        if total and done == total:
-            already = f" ({before} known from before)" if before else ""
-            _errors.print(f"{stage}: {total} runs done{already}" if total > 1 else f"{stage}: done")
+    def __init__(self, bars: Progress) -> None:
+        self._bars = bars
+        self._tasks: dict[str, TaskID] = {}
 
-    return told
+    def __call__(self, stage: str, done: int, total: int) -> None:
+        self.tally(Tally(stage, done, total))
+
+    def tally(self, tally: Tally) -> None:
+        stage, total = tally.stage, tally.total or None
+        if stage not in self._tasks:
+            self._tasks[stage] = self._bars.add_task(stage, total=total, pace="")
+        self._bars.update(self._tasks[stage], completed=tally.done, total=total, pace=tally.pace)
+
+
+class _Lines:
+    """One line per finished stage and, in a long one, every half minute; says how many runs were known from before."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock, self._last = clock, clock()
+
+    def __call__(self, stage: str, done: int, total: int) -> None:
+        self.tally(Tally(stage, done, total))
+
+    def tally(self, tally: Tally) -> None:
+        now = self._clock()
+        if tally.total and tally.done == tally.total:
+            already = f" ({tally.known} known from before)" if tally.known else ""
+            failed = f", {failures(tally.failed)}" if tally.n_failed else ""
+            one = (
+                f"{tally.stage}: {tally.total} runs done{already}{failed}"
+                if tally.total > 1
+                else f"{tally.stage}: done"
+            )
+            _errors.print(one, markup=False, soft_wrap=True)
+        elif tally.total and now - self._last >= LINE_EVERY:
+            pace = f", {tally.pace}" if tally.pace else ""
+            _errors.print(f"{tally.stage}: {tally.done} of {tally.total} runs{pace}", markup=False, soft_wrap=True)
+        else:
+            return
+        self._last = now
+
+
+def print_status(found: Standing, again: bool = False) -> None:
+    """Where a run is; `again` clears a terminal first, and puts a line between two texts elsewhere."""
+    if again and console.is_terminal:
+        console.clear()
+    elif again:
+        console.print()
+    for line in found.lines():
+        console.print(line, markup=False, soft_wrap=True)
 
 
 def design_table(design: Design, title: str, most: int = 40) -> None:

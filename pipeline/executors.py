@@ -1,19 +1,25 @@
 """How a design is run: what is known is read back, the rest is answered batch by batch and stored at once."""
 
+import time
 from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
 
 from experiments.designs import Design
 from experiments.oracles import Answers, Oracle
-from experiments.runs import Runs
+from experiments.runs import Runs, Status
 
-from .store import PointStore
+from .points import Answer, PointStore
+from .tally import Tally
 
 
 class Progress(Protocol):
-    """What a run tells while it goes: a stage, how many are done, and of how many."""
+    """What a run tells while it goes: a stage, how many are done, and of how many.
+
+    Who wants to know of failures, rate and time left has a method ``tally``, see :class:`.Watcher`.
+    """
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         """Called after every batch, from the thread that runs the study."""
@@ -24,10 +30,17 @@ def silent(stage: str, done: int, total: int) -> None:
     """Tell nothing."""
 
 
-def execute(oracle: Oracle, design: Design, store: PointStore, stage: str, progress: Progress = silent) -> Runs:
+def untold(tally: Tally) -> None:
+    """Tell nothing."""
+
+
+def execute(
+    oracle: Oracle, design: Design, store: PointStore, stage: str, tell: Callable[[Tally], None] = untold
+) -> Runs:
     """Run `design` in this process.
 
-    A point that was answered before, in this folder by the same oracle, is not run again.
+    A point that was answered before by the same oracle, in this folder or in the cache, is not run again.
+    What is used is what was stored, so that a run that is continued cannot differ.
     """
     points = design.physical
     keys = store.keys(points)
@@ -35,25 +48,48 @@ def execute(oracle: Oracle, design: Design, store: PointStore, stage: str, progr
     # A design may hold the same settings twice; they are paid for once.
     first = {key: i for i, key in reversed(list(enumerate(keys)))}
     missing = np.array(sorted(i for key, i in first.items() if key not in answers), dtype=int)
-    times = Counter(keys)
-    done = sum(times[key] for key in answers)
-    progress(stage, done, len(points))
+    count = _Count(stage, Counter(keys), answers)
+    tell(count.tally())
     for start in range(0, len(missing), oracle.batch):
         rows = missing[start : start + oracle.batch]
+        began = time.monotonic()
         runs = oracle(design.take(rows))
+        seconds = (time.monotonic() - began) / len(rows)
         batch = Answers(runs.values, list(runs.status), list(runs.reasons))
-        batch_keys = [keys[i] for i in rows]
-        store.add(batch_keys, points[rows], batch)
-        answers.update(
-            zip(batch_keys, zip(batch.values.tolist(), batch.status, batch.reasons, strict=True), strict=True)
+        added = store.add([keys[i] for i in rows], points[rows], batch, seconds)
+        answers.update(added)
+        count.add(added)
+        failed = [(i, answers[keys[i]]) for i in rows]
+        tell(
+            count.tally(
+                [f"run {i + 1} failed: {a.status} ({a.reason})" for i, a in failed if a.status is not Status.OK]
+            )
         )
-        done += sum(times[key] for key in batch_keys)
-        progress(stage, done, len(points))
     ordered = [answers[key] for key in keys]
     return Runs(
         design,
         oracle.responses,
-        np.array([values for values, _, _ in ordered], dtype=np.float64).reshape(len(design), len(oracle.responses)),
-        tuple(status for _, status, _ in ordered),
-        tuple(reason for _, _, reason in ordered),
+        np.array([a.values for a in ordered], dtype=np.float64).reshape(len(design), len(oracle.responses)),
+        tuple(a.status for a in ordered),
+        tuple(a.reason for a in ordered),
     )
+
+
+class _Count:
+    """How far a stage is; a setting that the design holds twice counts twice."""
+
+    def __init__(self, stage: str, times: Mapping[str, int], known: Mapping[str, Answer]) -> None:
+        self.stage, self.times, self.total, self.begun = stage, times, sum(times.values()), time.monotonic()
+        self.done, self.failed = 0, Counter[str]()
+        self.add(known)
+        self.known = self.done
+
+    def add(self, answers: Mapping[str, Answer]) -> None:
+        for key, answer in answers.items():
+            self.done += self.times[key]
+            if answer.status is not Status.OK:
+                self.failed[str(answer.status)] += self.times[key]
+
+    def tally(self, news: Sequence[str] = ()) -> Tally:
+        seconds = time.monotonic() - self.begun
+        return Tally(self.stage, self.done, self.total, self.known, dict(self.failed), seconds, tuple(news))

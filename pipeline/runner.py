@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from experiments.designs import Design, Random
-from experiments.runs import Runs
+from experiments.runs import Runs, Status
 from experiments.screening import Adequacy, Screening
 from surrogates import RoundTrip, Surrogate, dumps, loads, obstacle
 from surrogates.exports.verification import Outcome as Verified
@@ -18,12 +18,14 @@ from .config import FitTable, load_config
 from .errors import FlexdoceError, InputError
 from .executors import Progress, execute, silent
 from .growth import Grown, grow, wider
+from .monitor import Monitor
+from .points import PointStore
 from .provenance import provenance_json, read_provenance
 from .reading import Table, read_runs
 from .rounds import Round, read_rounds, rounds_csv
 from .stages import Fitted
-from .store import RunFolder
-from .study import STAGES, Study, resolve
+from .store import WORK, RunFolder
+from .study import STAGES, Study, ready, resolve
 
 ROUNDS = "fit/rounds.csv"
 
@@ -97,6 +99,8 @@ def run(
     overrides: Sequence[str] = (),
     fresh: bool = False,
     progress: Progress = silent,
+    cache: str | Path | None = None,
+    retry: Sequence[Status] = (),
 ) -> Outcome:
     """Run or continue the study in a config file.
 
@@ -111,29 +115,45 @@ def run(
         Start anew in a folder that belongs to a study already.
     progress : callable
         Told the stage, the runs done and the runs in all.
+    cache : path, optional
+        Folder of points that studies share: what is there is not run again, what is run is added.
+    retry : collection of Status
+        Failures of earlier runs that are tried again; without it they are answers like others.
 
     Raises
     ------
     InputError
-        If the config or the folder is wrong; nothing is touched then.
+        If the config, the folder or a store is wrong, or another run is at work there; nothing is touched then.
     TooManyFailures
         If more runs failed than the config tolerates.
+    OSError
+        If the disk refuses on the way; what is stored is kept.
 
     Notes
     -----
     A declared requirement that does not hold is no error here: it is in the outcome's ``shortfalls``.
     """
     study = resolve(load_config(config, overrides))
-    folder = RunFolder.claim(Path(out) if out is not None else Path("runs") / study.config.name, study.config, fresh)
-    return _Runner(study, folder, progress).run()
+    place = Path(out) if out is not None else Path("runs") / study.config.name
+    study = ready(study, place / WORK)
+    folder = RunFolder.claim(place, study.config, fresh)
+    shared = Path(cache) if cache is not None else None
+    with (
+        folder,
+        folder.points(study.oracle, shared, retry) as points,
+        Monitor(folder, study.config.name, progress) as monitor,
+    ):
+        points.warn = monitor.note
+        for sentence in filter(None, (folder.taken_over, points.strangers())):
+            monitor.note(sentence)
+        return _Runner(study, folder, points, monitor).run()
 
 
 class _Runner:
     """One pass through the stages."""
 
-    def __init__(self, study: Study, folder: RunFolder, progress: Progress) -> None:
-        self.study, self.folder, self.progress = study, folder, progress
-        self.points = folder.points(study.oracle)
+    def __init__(self, study: Study, folder: RunFolder, points: PointStore, monitor: Monitor) -> None:
+        self.study, self.folder, self.points, self.monitor = study, folder, points, monitor
         self.seconds: dict[str, float] = {}
         self.fit_runs: Runs | None = None
         self.is_again = study.config.require.max_runs is not None and (folder.path / "model.json").is_file()
@@ -175,7 +195,7 @@ class _Runner:
 
     def _executed(self, stage: str, design: Design) -> Runs:
         self.folder.write(f"{stage}/design.csv", tables.design_csv(design))
-        runs = execute(self.study.oracle, design, self.points, stage, self.progress)
+        runs = execute(self.study.oracle, design, self.points, stage, self.monitor.tally)
         self._write_runs(stage, runs)
         return runs
 
@@ -220,7 +240,7 @@ class _Runner:
         """As `_executed`, but the files of a finished study stay as they are until its last round is there again."""
         if not self.is_again:
             return self._executed(stage, design)
-        return execute(self.study.oracle, design, self.points, stage, self.progress)
+        return execute(self.study.oracle, design, self.points, stage, self.monitor.tally)
 
     def _round_trip(self, model: Surrogate, validation_runs: Runs) -> RoundTrip:
         targets, inversion, design = stages.inversion_design(model, validation_runs)
@@ -256,12 +276,12 @@ class _Runner:
     @contextmanager
     def _timed(self, stage: str) -> Iterator[None]:
         if stage not in STAGES:
-            self.progress(stage, 0, 0)
+            self.monitor.step(stage, done=False)
         begin = time.perf_counter()
         yield
         self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begin
         if stage not in STAGES:
-            self.progress(stage, 1, 1)
+            self.monitor.step(stage, done=True)
 
 
 def read_run(path: str | Path) -> Outcome:

@@ -1,9 +1,10 @@
 """A study: a config resolved into the objects that the stages work with."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -141,7 +142,7 @@ def resolve(config: Config) -> Study:
     InputError
         With one sentence that says which table is wrong, what came and what is allowed.
     """
-    oracle = _checked("oracle", lambda: oracles.get(config.oracle.name, **config.oracle.parameters))
+    oracle = _oracle(config)
     _checked("oracle.parameters", oracle.prepare)
     space = _checked("factors", lambda: _space(config, oracle))
     screening = config.screening
@@ -170,6 +171,37 @@ def resolve(config: Config) -> Study:
     _check_exports(study)
     _check_command(study)
     return study
+
+
+def _oracle(config: Config) -> Oracle:
+    """The oracle of that name, with its parameters or, if it is a program, with its table."""
+    table = config.oracle
+    if table.command is None and table.name != "command":
+        return _checked("oracle", lambda: oracles.get(table.name, **table.parameters))
+    if table.command is None or table.name != "command":
+        raise InputError(
+            "oracle.name = 'command' and a table [oracle.command] belong together; see docs/command-oracle.md"
+        )
+    if table.parameters:
+        raise InputError("oracle.parameters: a program has none; write what it needs into argv or a template")
+    settings = table.command.settings
+    return _checked("oracle.command", lambda: oracles.get("command", **settings))
+
+
+def ready(study: Study, place: Path) -> Study:
+    """The study with its program's working folders in `place`; as it is where its oracle is no program.
+
+    Raises
+    ------
+    InputError
+        If the program is not on this machine: better now than as so many failed points.
+    """
+    oracle: Any = study.oracle
+    if not hasattr(oracle, "working_in"):
+        return study
+    if oracle.missing:
+        raise InputError(f"oracle.command: {oracle.missing}")
+    return replace(study, oracle=oracle.working_in(place))
 
 
 def highest_degree(fit: FitTable) -> int:

@@ -11,6 +11,7 @@ from ..settings import build
 from .base import Answers, Arrow, JaxOracle, Line, Oracle, PointOracle, PublishedMap, Shape
 
 __all__ = [
+    "CONFIGURED",
     "Answers",
     "Arrow",
     "JaxOracle",
@@ -30,11 +31,14 @@ _BUILT_IN = {
     "flexure_3rrr": ".flexure_3rrr:Flexure3RRR",
     "cantilever": ".cantilever:Cantilever",
 }
+CONFIGURED = {"command": ".command:CommandOracle"}
+"""Oracles that are nothing without settings of their own; :func:`names` leaves them out."""
+
 _REGISTERED: dict[str, type[Oracle]] = {}
 
 
 def names() -> tuple[str, ...]:
-    """Names of all known oracles."""
+    """Names of all known oracles that can be had by name alone."""
     return (*_BUILT_IN, *_REGISTERED)
 
 
@@ -47,7 +51,7 @@ def register(cls: type[Oracle]) -> type[Oracle]:
         If the name is not an identifier or belongs to a built-in oracle.
     """
     check_name("oracle", cls.name)
-    if cls.name in _BUILT_IN:
+    if cls.name in _BUILT_IN or cls.name in CONFIGURED:
         raise ValueError(f"the oracle name {cls.name!r} is taken by a built-in; choose another")
     _REGISTERED[cls.name] = cls
     return cls
@@ -57,12 +61,16 @@ def oracle_class(name: str) -> type[Oracle]:
     """The class behind a name; ``ValueError`` with the nearest name if there is none."""
     if name in _REGISTERED:
         return _REGISTERED[name]
-    if name not in _BUILT_IN:
-        raise ValueError(f"unknown oracle {name!r}{suggestion(name, names())}")
-    module, _, attribute = _BUILT_IN[name].partition(":")
+    built_in = {**_BUILT_IN, **CONFIGURED}
+    if name not in built_in:
+        raise ValueError(f"unknown oracle {name!r}{suggestion(name, (*names(), *CONFIGURED))}")
+    module, _, attribute = built_in[name].partition(":")
     return getattr(import_module(module, __package__), attribute)
 
 
 def get(name: str, **parameters: Any) -> Oracle:
     """The oracle of that name with its parameters; ``ValueError`` for unknown names and bad values."""
-    return build(f"oracle {name!r}", oracle_class(name), parameters)
+    cls: Any = oracle_class(name)
+    if name in CONFIGURED:
+        return cls.from_settings(parameters)
+    return build(f"oracle {name!r}", cls, parameters)

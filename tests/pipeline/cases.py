@@ -113,7 +113,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {p.relative_to(folder).as_posix(): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
-CLOCKED = ("provenance.json", "report.html", "points.sqlite")
+CLOCKED = ("provenance.json", "report.html", "points.sqlite", "log.txt", "state.json")
 """Files that may differ between two runs of one study: the clock, and what shows or stores it."""
 
 

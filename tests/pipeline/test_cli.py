@@ -313,7 +313,7 @@ class TestExitCodes:
             main(["--help"])
         assert stopped.value.code == 0
         text = " ".join(capsys.readouterr().out.split())
-        for word in ("run", "check", "plan", "report", "predict", "invert", "export", "verify", "list"):
+        for word in ("run", "check", "plan", "report", "predict", "invert", "export", "verify", "status", "list"):
             assert f" {word} " in text
         assert "2 bad config" in text
 

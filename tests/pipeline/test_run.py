@@ -28,7 +28,7 @@ STAGES = ("screening", "fit", "validation", "inversion")
 CC = next((c for c in ("gcc", "cc", "clang") if shutil.which(c)), None)
 
 FILES = {
-    "config.toml", "provenance.json", "points.sqlite", "model.json", "report.html",
+    "config.toml", "provenance.json", "points.sqlite", "model.json", "report.html", "log.txt", "state.json",
     "screening/design.csv", "screening/runs.csv", "screening/effects.csv",
     "fit/design.csv", "fit/runs.csv",
     "validation/design.csv", "validation/runs.csv", "validation/errors.csv",
