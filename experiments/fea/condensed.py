@@ -5,6 +5,7 @@ EI / L, and motions of L or radians.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +13,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from .arrays import FrameArrays
-from .elimination import Plan, Sum, plan
+from .elimination import Pair, Plan, Sum, plan
 from .planar import Planar
 from .rods import Rods
 from .spatial import Spatial
@@ -94,36 +95,45 @@ class State(NamedTuple):
 
 
 def topology(arrays: FrameArrays, space: Space, n_steps: int) -> Topology:
-    """The topology of a frame."""
-    start, end = arrays.block[arrays.ends].T
-    n_members, n_free = len(start), arrays.n_free
-    ends = list(zip(start.tolist(), end.tolist(), strict=True))
+    """The topology of a frame: the same object for frames alike, so that what is compiled for one serves the other."""
+    ends = tuple((a, b) for a, b in arrays.block[arrays.ends].tolist())
+    held = arrays.held[: arrays.n_free, list(space.motions)]
+    return _settled(space, n_steps, ends, arrays.n_free, arrays.n_blocks, tuple(map(tuple, held.tolist())))
+
+
+@lru_cache(maxsize=32)  # as many as the kernel keeps programs
+def _settled(
+    space: Space, n_steps: int, ends: tuple[Pair, ...], n_free: int, n_blocks: int, held: tuple[tuple[bool, ...], ...]
+) -> Topology:
+    """From the blocks that each member joins, and the motions of each free block that are held."""
+    n_members = len(ends)
     pattern = plan(n_free, [(a, b) for a, b in ends if a < n_free and b < n_free])
     place = {pair: i for i, pair in enumerate(pattern.entries)}
 
     entries: list[list[int]] = [[] for _ in place]
-    bodies: list[list[int]] = [[] for _ in range(arrays.n_blocks)]
+    bodies: list[list[int]] = [[] for _ in range(n_blocks)]
     for m, (a, b) in enumerate(ends):
         for corner, pair in enumerate([(a, a), (a, b), (b, a), (b, b)]):
             if pair in place:
                 entries[place[pair]].append(corner * n_members + m)
         bodies[a].append(m)
         bodies[b].append(n_members + m)
-    for block in range(arrays.n_blocks):
+    for block in range(n_blocks):
         bodies[block].append(2 * n_members + block)
         if block < n_free:
             entries[place[block, block]].append(4 * n_members + block)
     rows: list[list[int]] = [[] for _ in range(n_free)]
     for i, (row, _) in enumerate(pattern.entries):
         rows[row].append(i)
+    start, end = np.array(ends, dtype=np.int64).T
     return Topology(
         space,
         n_steps,
         start,
         end,
         n_free,
-        arrays.n_blocks,
-        arrays.held[:n_free, list(space.motions)].T[:, :, None],
+        n_blocks,
+        np.array(held, dtype=bool).reshape(n_free, space.size).T[:, :, None],
         pattern,
         Sum.of(entries),
         np.array([column for _, column in pattern.entries], dtype=np.int64),

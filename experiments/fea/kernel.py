@@ -84,11 +84,15 @@ class Kernel:
 
     topology: Topology
 
-    def settle(self, problem: Problem, view: View, only_stable: bool) -> Settled:
-        """Equilibria of all points: all at one go; what that does not find beyond doubt, in steps."""
+    def settle(self, problem: Problem, view: View, only_stable: bool, n_cases: int) -> Settled:
+        """Equilibria of the first `n_cases` points: all at one go; what that does not find beyond doubt, in steps.
+
+        The others only fill the chunk: they stay at rest, so that blocks of them cost nothing.
+        """
         n_points = problem.dead.shape[-1]
-        first = self._tried(problem, view, np.ones(n_points), False, MOST_AT_ONCE)
-        chosen = np.flatnonzero(~first.is_sound(only_stable) | (first.astray > ASTRAY))
+        asked = np.arange(n_points) < n_cases
+        first = self._tried(problem, view, asked.astype(np.float64), False, MOST_AT_ONCE)
+        chosen = np.flatnonzero(asked & (~first.is_sound(only_stable) | (first.astray > ASTRAY)))
         if not chosen.size:
             return first
         rows = np.resize(chosen, n_points)

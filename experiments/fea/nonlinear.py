@@ -259,7 +259,7 @@ class NonlinearSolver:
             at = scaling.geometry(self.arrays) if here is None else here
             along = directions(self.arrays, self.kernel.topology, self.units, toward, at, loads)
             problem = problem._replace(along=along)
-        settled = self.kernel.settle(problem, view, only_stable)
+        settled = self.kernel.settle(problem, view, only_stable, len(rows))
         return taken(settled, np.arange(len(rows))), taken(centre, np.arange(len(rows)))
 
     def problem(

@@ -3,6 +3,7 @@
 The batch lies in the last axes of every array.
 """
 
+from dataclasses import dataclass
 from typing import ClassVar
 
 import jax.numpy as jnp
@@ -13,6 +14,7 @@ from .blocks import apply
 from .rods import Along, Components, Rods, along, even_series, integrate
 
 
+@dataclass(frozen=True)  # any two are equal
 class Planar:
     """The plane as the nonlinear solver sees it; :class:`.spatial.Spatial` has the same methods."""
 

@@ -4,6 +4,7 @@ The batch lies in the last axes of every array. Rotations are never added: a spi
 multiplies the quaternion, so that large rotations have no order in which they were made.
 """
 
+from dataclasses import dataclass
 from typing import ClassVar
 
 import jax.numpy as jnp
@@ -14,6 +15,7 @@ from .blocks import apply, four, multiply, skew
 from .rods import Along, Components, Rods, along, even_series, integrate
 
 
+@dataclass(frozen=True)  # any two are equal
 class Spatial:
     """Space as the nonlinear solver sees it; :class:`.planar.Planar` has the same methods."""
 

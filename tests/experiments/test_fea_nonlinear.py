@@ -1,6 +1,7 @@
 """The nonlinear solver's contract: what it refuses, in which words, and how its answers are read."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -41,6 +42,21 @@ def found(solver):
     """One case that bends by a radian, one that is pulled, and one without load."""
     cases = [[Load("tip", moment=(0, 0, 0.2))], [Load("arm", force=(5.0, 1.0, 0))], []]
     return solver.solve(load_array(solver.frame, cases))
+
+
+# ---- What is compiled ----
+
+
+def test_frames_that_are_joined_alike_share_their_programs(solver):
+    """Whatever their sizes; not with other steps, in space, or held otherwise, which are other programs."""
+    longer = condense(leaf(tip=(0.2, 0.0, 0.0)), planar=True)
+    assert longer.kernel.topology is solver.kernel.topology
+    pinned = leaf(clamps=(), supports=[Support("root", ("x", "y", "rz"))])
+    guided = leaf(supports=[Support("tip", ("x", "rz"))])
+    others = [condense(frame, planar=True) for frame in (pinned, guided, replace(guided, supports=()))]
+    others += [condense(leaf(), planar=True, n_steps=10), condense(leaf())]
+    same = [other.kernel.topology is solver.kernel.topology for other in others]
+    assert same == [False, False, True, False, False]
 
 
 # ---- Refusals when a frame is condensed ----

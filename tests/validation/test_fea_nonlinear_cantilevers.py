@@ -6,8 +6,7 @@ those of the step, h⁴, and not of float64. The cases of one solve differ in ge
 
 import json
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,12 +18,11 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
-from experiments.fea import Frame, Material, Member, RigidBody, Section, condense
-from experiments.fea.elements import Properties
+from experiments.fea import Material, Member, Section, condense
 from experiments.fea.equilibria import Equilibria
 from experiments.fea.nonlinear import NonlinearSolver
-from experiments.fea.scaling import Geometry
-from tests.rod_equations import Rod, loaded_end
+from tests.rod_cases import DRIVE, ORDER, RIGID, Case, Tips, arc, assert_order, frame, geometries, run
+from tests.rod_equations import Rod, driven_end
 
 Floats = NDArray[np.float64]
 
@@ -32,137 +30,15 @@ REFERENCE = Path(__file__).parents[1] / "reference"
 BEAMS = json.loads((REFERENCE / "beams.json").read_text(encoding="utf-8"))
 BEND = json.loads((REFERENCE / "opensees_cantilevers.json").read_text(encoding="utf-8"))["bend_45"]
 
-RIGID = 1e12
-"""Stretching and shear stiffness over EI/L² of what counts as inextensible: strains of 1e-11."""
-
-ORDER = (3.5, 4.6)
-"""Where the order of a method of the fourth order may lie while h is not small; for the finest steps of a sequence."""
-
-
-# ---- Cantilevers of length, EI and therefore forces of order one, several in one frame ----
-
-
-@dataclass(frozen=True)
-class Case:
-    """One cantilever and what acts on its tip; the force `dead[:3]` acts at `arm` from the tip, carried rigidly."""
-
-    name: str
-    curve: Callable[[float], Floats] = lambda s: np.array([s, 0.0, 0.0])
-    stiffness: Sequence[float] = (RIGID, RIGID, RIGID, 1.0, 1.0, 1.0)  # EA, GA_y, GA_z, GJ, EI_y, EI_z
-    dead: Sequence[float] = field(default=(0.0,) * 6)
-    follower: Sequence[float] = field(default=(0.0,) * 6)
-    arm: Sequence[float] = (0.0, 0.0, 0.0)
-
-    @property
-    def rod(self) -> tuple[Rod, Floats]:
-        """The equations of the cantilever, and the directors of its tip at rest."""
-        start, middle, end = (self.curve(s) for s in (0.0, 0.5, 1.0))
-        chord, seen = end - start, np.cross(middle - start, end - middle)
-        half = math.atan2(np.linalg.norm(seen), (middle - start) @ (end - middle))
-        normal = seen / np.linalg.norm(seen) if half > 1e-12 else np.zeros(3)
-        tangent = Rotation.from_rotvec(-half * normal).apply(chord / np.linalg.norm(chord))
-        z = np.array([0.0, 0.0, 1.0]) - tangent * tangent[2]
-        z /= np.linalg.norm(z)
-        turn = np.stack([tangent, np.cross(z, tangent), z], axis=1)
-        length = np.linalg.norm(chord) * (half / math.sin(half) if half > 1e-12 else 1.0)
-        rod = Rod(start, turn, length, 1 / np.array(self.stiffness), turn.T @ normal * 2 * half / length)
-        return rod, Rotation.from_rotvec(2 * half * normal).as_matrix() @ turn
-
-    def solved(self, guess: Floats) -> tuple[Floats, Rotation]:
-        """Translation and rotation of the tip by SciPy; `guess` is the wrench at the clamp."""
-        rod, rest = self.rod
-        conditions = loaded_end(rest, self.dead, self.follower, self.arm)
-        _, place, turn = rod.shoot(conditions, guess)
-        return place - self.curve(1.0), Rotation.from_matrix(turn @ rest.T)
-
-
-def arc(radius: float, angle: float, turn: Rotation | None = None) -> Callable[[float], Floats]:
-    """From the origin along y, bending towards x, all of it turned."""
-    turn = turn or Rotation.identity()
-
-    def place(s: float) -> Floats:
-        return turn.apply([radius * (1 - math.cos(s * angle)), radius * math.sin(s * angle), 0.0])
-
-    return place
-
-
-def geometry(cases: Sequence[Case]) -> Geometry:
-    """One member of its own curve and section for every case."""
-    coordinates = [[case.curve(0.0), case.curve(1.0), case.curve(1.0) + case.arm] for case in cases]
-    ea, gy, gz, gj, ey, ez = np.transpose([case.stiffness for case in cases])[:, None]
-    one = np.ones_like(ea)
-    through = np.transpose([[case.curve(0.5)] for case in cases])
-    up = np.array([0.0, 0.0, 1.0])[:, None, None]
-    return Geometry(np.transpose(coordinates), through, up, Properties(one, one, ea, ey, ez, gj, gy, gz))
-
-
-@dataclass(frozen=True)
-class Tips:
-    """Tips of all cases on each number of steps."""
-
-    cases: tuple[Case, ...]
-    found: dict[int, Equilibria]
-
-    @property
-    def steps(self) -> list[int]:
-        return list(self.found)
-
-    def all_found(self, name: str) -> tuple[int, list[Equilibria]]:
-        """Number of the case, and the equilibria on each number of steps."""
-        i = [case.name for case in self.cases].index(name)
-        for steps, found in self.found.items():
-            assert found.ok[i], f"{steps} steps: {found.reasons[i]}"
-        return i, list(self.found.values())
-
-    def motion(self, name: str) -> Floats:
-        """Translation and rotation vector on each number of steps, (n, 6)."""
-        i, found = self.all_found(name)
-        return np.stack([one.at("tip")[i] for one in found])
-
-    def errors(self, name: str, translation: Floats, rotation: Rotation) -> Floats:
-        """Largest error of a translation or angle on each number of steps, (n,)."""
-        i, found = self.all_found(name)
-        turned = [(one.rotation("tip")[i] * rotation.inv()).magnitude() for one in found]
-        return np.maximum(np.abs(self.motion(name)[:, :3] - translation).max(1), turned)
-
-    def errors_by_scipy(self, name: str) -> Floats:
-        """The same, beside the equations of the rod; what the clamp exerts is the guess."""
-        i, found = self.all_found(name)
-        return self.errors(name, *self.cases[i].solved(-found[-1].reactions[i, 0]))
-
-
-def solvers(steps: Sequence[int], planar: bool) -> dict[int, NonlinearSolver]:
-    """The frame is of any shape: all cases bring their own."""
-    nodes = {"root": (0, 0, 0), "tip": (1, 0, 0), "arm": (1, 0.5, 0)}
-    member = Member("m", "root", "tip", Section(1.0, 1.0, 1.0, 1.0), Material(1.0, 0.0), (0, 0, 1), (0.5, 0.1, 0))
-    frame = Frame(nodes, [member], [RigidBody("lever", "tip", ("arm",))], clamps=["root"])
-    return {n: condense(frame, planar=planar, n_steps=n) for n in steps}
-
-
-def run(solvers: dict[int, NonlinearSolver], cases: Sequence[Case], only_stable: bool = True) -> Tips:
-    dead, follower = np.zeros((2, len(cases), 3, 6))
-    dead[:, 1, 3:] = [case.dead[3:] for case in cases]
-    for row, case in zip(dead, cases, strict=True):
-        row[2 if any(case.arm) else 1, :3] = case.dead[:3]
-    follower[:, 1] = [case.follower for case in cases]
-    where = geometry(cases)
-    return Tips(tuple(cases), {n: s.solve(dead, None, follower, where, only_stable) for n, s in solvers.items()})
-
-
-def assert_order(steps: Sequence[int], errors: Floats, floor: float = 1e-11) -> None:
-    """Fourth order in the end, and better than second before h is small; down to what float64 leaves."""
-    kept = errors > floor
-    steps, errors = np.array(steps)[kept], errors[kept]
-    seen = np.log(errors[:-1] / errors[1:]) / np.log(steps[1:] / steps[:-1])
-    assert ORDER[0] < seen[-1] < ORDER[1], (errors, seen)
-    assert np.all(seen > 2), (errors, seen)
-
-
 # ---- The cases ----
 
 ALPHAS = (0.1, 1.0, 2.0, 5.0, 10.0, 20.0)
 UNEVEN = (RIGID, RIGID, RIGID, 0.6, 0.5, 1.0)
 SOFT = (400.0, 150.0, 120.0, 0.6, 0.5, 1.3)  # stretches and shears by per cents
+DRIVEN = Member(
+    "driven", "base", "drive", Section(60.0, 0.7, 1.0, 0.8, 40.0, 50.0), Material(1.0, -0.5), (0.3, 1.0, 0.0)
+)
+"""Gives way along itself, so that an end that turns in its place does not tear it; the shear modulus is one too."""
 SKEW = Rotation.from_rotvec([0.5, -0.3, 0.4])
 BEND_SIZE, BEND_EI = 100.0, 1e7 / 12  # what the lengths and EI of the bend are divided by
 BEND_STIFFNESS = (1e7 * BEND_SIZE**2 / BEND_EI, *(1e7 / 2.4 * BEND_SIZE**2 / BEND_EI,) * 2, 1.0, 1.0, 1.0)
@@ -209,12 +85,14 @@ IN_SPACE = [
 
 @pytest.fixture(scope="module")
 def planar() -> Tips:
-    return run(solvers((4, 8, 16, 32), planar=True), IN_PLANE)
+    """On steps of three sizes, since each is another program that takes 20 s to compile."""
+    return run({n: condense(frame(), planar=True, n_steps=n) for n in (4, 16, 32)}, IN_PLANE)
 
 
 @pytest.fixture(scope="module")
 def in_space() -> dict[int, NonlinearSolver]:
-    return solvers((10, 40), planar=False)
+    """With the driven member of the end of this file."""
+    return {n: condense(frame(DRIVEN), n_steps=n) for n in (10, 40)}
 
 
 @pytest.fixture(scope="module")
@@ -259,9 +137,8 @@ def expected(alpha: float, axis: int = 1) -> tuple[Floats, Rotation]:
 
 @pytest.mark.parametrize("alpha", ALPHAS)
 def test_mattiasson_1981_elastica_in_the_plane_is_of_fourth_order(planar, alpha):
-    """4, 8, 16 and 32 steps. At α = 20 the curvature decays within √(EI/P) = 0.22 L of the clamp: from 8 on."""
-    some = planar if alpha < 20 else Tips(planar.cases, {n: f for n, f in planar.found.items() if n >= 8})
-    assert_order(some.steps, some.errors(f"y {alpha}", *expected(alpha)))
+    """4, 16 and 32 steps."""
+    assert_order(planar.steps, planar.errors(f"y {alpha}", *expected(alpha)))
 
 
 @pytest.mark.parametrize("axis", [1, 2])
@@ -356,3 +233,85 @@ def test_in_the_plane_against_the_equations_of_the_rod(planar, name):
 @pytest.mark.parametrize("name", ["follower", "follower wrench", "both", "lever", "soft", "arc", "ring"])
 def test_in_space_against_the_equations_of_the_rod(spatial, name):
     assert_order(spatial.steps, spatial.errors_by_scipy(name))
+
+
+# ---- Cantilevers that point elsewhere than the frame that was condensed ----
+
+
+def test_a_geometry_may_be_turned_far_from_the_frame(in_space):
+    """They move as one along the frame does, seen from their own axes: x ahead, z towards the global y."""
+    towards = np.array([(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -0.6, 0.8), (-0.6, 0.0, -0.8)])
+    up, force = np.array([0.0, 1.0, 0.0]), np.array([0.3, 0.6, 0.9])
+
+    def axes(x: Floats) -> Floats:
+        z = up - (up @ x) * x
+        z /= np.linalg.norm(z)
+        return np.array([x, np.cross(z, x), z])
+
+    def leaf(name: str, x: Floats, force: Floats) -> Case:
+        return Case(name, lambda s: s * x, SOFT, dead=(*force, 0, 0, 0), up=tuple(up))
+
+    turns = [axes(x).T @ axes(towards[0]) for x in towards]
+    pulled = [leaf(f"global {i}", x, force) for i, x in enumerate(towards)]
+    carried = [leaf(f"own {i}", towards[0], turn.T @ force) for i, turn in enumerate(turns)]
+    tips = run({10: in_space[10]}, [*pulled, *carried])
+    for i, turn in enumerate(turns):
+        found, expected = (tips.motion(f"{kind} {i}").reshape(2, 3) for kind in ("global", "own"))
+        assert_allclose(found, expected @ turn.T, atol=1e-11)
+
+
+# ---- Prescribed motions of a clamped end ----
+
+MOTIONS = {
+    "a right angle": (np.zeros(3), [0.0, math.pi / 2, 0.0]),
+    "about a skew axis": (np.zeros(3), [0.6, -0.8, 1.0]),
+    "moved and turned": (np.array([-0.1, 0.2, 0.3]), [-0.7, 0.5, 0.4]),
+    "twisted": (np.zeros(3), 0.8 * np.array(DRIVE)),
+}
+T, WEIGHTS = (np.polynomial.legendre.leggauss(12)[0] + 1) / 2, np.polynomial.legendre.leggauss(12)[1] / 2
+
+
+@pytest.fixture(scope="module")
+def driven(in_space) -> dict[int, Equilibria]:
+    """For every motion all of it and its fractions T."""
+    rows = np.concatenate([np.outer([1.0, *T], np.concatenate(motion)) for motion in MOTIONS.values()])
+    motions = np.zeros((len(rows), len(in_space[10].frame.nodes), 6))
+    motions[:, in_space[10].frame.index("drive")] = rows
+    return {n: s.solve(motions=motions, geometry=geometries(s, len(rows))) for n, s in in_space.items()}
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_driven_end_against_the_equations_of_the_rod(driven, name):
+    """The end where it is put, and what it takes to the fourth order; a twist alone is exact."""
+    translation, rotation = MOTIONS[name]
+    i, errors = list(MOTIONS).index(name) * (1 + len(T)), []
+    for found in driven.values():
+        assert found.ok[i], found.reasons[i]
+        assert_allclose(found.at("drive")[i, :3], translation, atol=1e-12)
+        left = found.rotation("drive")[i] * Rotation.from_rotvec(rotation).inv()
+        assert_allclose(left.magnitude(), 0, atol=1e-12)
+        directors, clamp = found.arrays.axes[1].T, found.reactions[i, 1]
+        rod = Rod(np.zeros(3), directors, 1.0, 1 / np.array([60.0, 40.0, 50.0, 0.8, 0.7, 1.0]), np.zeros(3))
+        wrench, _, _ = rod.shoot(driven_end(directors, DRIVE + translation, rotation), -clamp)
+        errors.append(np.abs(clamp + wrench).max() / np.abs(wrench).max())
+        assert_allclose(found.support_reactions[i, 0, :3], -clamp[:3], atol=1e-9)
+    if name == "twisted":
+        assert max(errors) < 1e-9
+    else:
+        assert_order(list(driven), np.array(errors))
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_work_of_a_drive_in_space_is_the_strain_energy(driven, name):
+    """∫ (F·d + M·θ) dt along t d and exp(t θ), whose spin is θ all along; to the fourth order, or better."""
+    start, left = list(MOTIONS).index(name) * (1 + len(T)), []
+    for found in driven.values():
+        rows = slice(start + 1, start + 1 + len(T))
+        assert found.ok[rows].all(), found.reasons[rows]
+        work = WEIGHTS @ (found.support_reactions[rows, 0] @ np.concatenate(MOTIONS[name]))
+        left.append(abs(work / found.energy[start] - 1))
+    if name == "twisted":
+        assert max(left) < 1e-9
+    else:
+        assert left[0] / left[1] > 4 ** ORDER[0]
+        assert left[0] < 4e-4  # 1e-3 on 8 steps

@@ -1,11 +1,10 @@
-"""Verification of the nonlinear FEA on frames in space: laws that hold for any of them, drives, and the linear limit.
+"""Verification of the nonlinear FEA on frames in space: laws that hold for any of them, and the linear limit.
 
 One frame of several parts that do not touch: a space frame with a rigid body and an arc, an arc on a ball joint, and
-the right-angle cantilever that OpenSees has solved too. A driven member is a frame of its own.
+the right-angle cantilever that OpenSees has solved too.
 """
 
 import json
-import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +18,6 @@ from experiments.fea import Frame, Load, Material, Member, RigidBody, Section, S
 from experiments.fea.equilibria import Equilibria
 from experiments.fea.nonlinear import NonlinearSolver
 from experiments.fea.scaling import geometry
-from tests.rod_equations import Rod, driven_end
 
 Floats = NDArray[np.float64]
 
@@ -103,8 +101,7 @@ def test_turning_the_whole_model_turns_the_answer(solver, eight):
     """To 1e-10: every equation is in the axes of a body or a section."""
     loads, motions, followers = (TURN.apply(x.reshape(-1, 3)).reshape(x.shape) for x in actions(solver.frame, 8))
     frame = gallery(TURN)
-    turned = replace(condense(frame, n_steps=16), kernel=solver.kernel)  # of the same topology: no second compilation
-    found = turned.solve(loads, motions, followers)
+    found = condense(frame, n_steps=16).solve(loads, motions, followers)
     expected = TURN.apply(eight.displacements.reshape(-1, 3).copy()).reshape(eight.displacements.shape)
     assert_allclose(found.displacements, expected, atol=1e-10)
     assert_allclose(found.internal, eight.internal, atol=1e-9 * np.abs(eight.internal).max())
@@ -194,72 +191,8 @@ def test_geometry_is_that_of_another_frame(solver):
         for m, d in zip(frame.members, through, strict=True)
     ]
     other = Frame(nodes, members, frame.bodies, frame.clamps, frame.supports)
-    built = replace(condense(other, n_steps=16), kernel=solver.kernel)
+    built = condense(other, n_steps=16)
     acting = actions(frame, 2)
     expected, found = built.solve(*acting), solver.solve(*acting, geometry=geometry(built.arrays))
     assert_allclose(found.displacements, expected.displacements, atol=1e-9)
     assert_allclose(found.reactions, expected.reactions, atol=1e-8 * np.abs(expected.reactions).max())
-
-
-# ---- Prescribed motions of a clamped end in space ----
-
-ALONG = np.array([2.0, -1.0, 2.0]) / 3
-MOTIONS = {
-    "a right angle": (np.zeros(3), [0.0, math.pi / 2, 0.0]),
-    "about a skew axis": (np.zeros(3), [0.6, -0.8, 1.0]),
-    "moved and turned": (np.array([-0.1, 0.2, 0.3]), [-0.7, 0.5, 0.4]),
-    "twisted": (np.zeros(3), 0.8 * ALONG),
-}
-SOFT = Section(60.0, 0.7, 1.0, 0.8, 40.0, 50.0)
-"""Gives way along itself, so that an end that turns in its place does not tear it."""
-
-T, WEIGHTS = (np.polynomial.legendre.leggauss(12)[0] + 1) / 2, np.polynomial.legendre.leggauss(12)[1] / 2
-
-
-@pytest.fixture(scope="module")
-def driven() -> dict[int, Equilibria]:
-    """For every motion all of it and its fractions T, on 8 and on 16 steps."""
-    nodes = {"root": (0.0, 0.0, 0.0), "tip": tuple(ALONG)}
-    member = Member("m", "root", "tip", SOFT, Material(YOUNG, POISSON), (0.3, 1.0, 0.0))
-    frame = Frame(nodes, [member], clamps=["root"], supports=[Support("tip", ("x", "y", "z", "rx", "ry", "rz"))])
-    motions = np.zeros((len(MOTIONS), 1 + len(T), 2, 6))
-    for rows, motion in zip(motions, MOTIONS.values(), strict=True):
-        rows[:, 1] = np.array([1.0, *T])[:, None] * np.concatenate(motion)
-    return {n: condense(frame, n_steps=n).solve(motions=motions.reshape(-1, 2, 6)) for n in (8, 16)}
-
-
-@pytest.mark.parametrize("name", MOTIONS)
-def test_driven_end_against_the_equations_of_the_rod(driven, name):
-    """The tip where it is put, and what it takes to the fourth order; a twist alone is exact."""
-    translation, rotation = MOTIONS[name]
-    i, errors = list(MOTIONS).index(name) * (1 + len(T)), []
-    for found in driven.values():
-        assert found.ok[i], found.reasons[i]
-        assert_allclose(found.at("tip")[i, :3], translation, atol=1e-12)
-        left = found.rotation("tip")[i] * Rotation.from_rotvec(rotation).inv()
-        assert_allclose(left.magnitude(), 0, atol=1e-12)
-        directors = found.arrays.axes[0].T
-        rod = Rod(np.zeros(3), directors, 1.0, 1 / np.array([60.0, 40.0, 50.0, 0.8, 0.7, 1.0]), np.zeros(3))
-        wrench, _, _ = rod.shoot(driven_end(directors, ALONG + translation, rotation), -found.reactions[i, 0])
-        errors.append(np.abs(found.reactions[i, 0] + wrench).max() / np.abs(wrench).max())
-        assert_allclose(found.support_reactions[i, 0, :3], -found.reactions[i, 0, :3], atol=1e-9)
-    if name == "twisted":
-        assert max(errors) < 1e-9
-    else:
-        assert 11 < errors[0] / errors[1] < 25
-
-
-@pytest.mark.parametrize("name", MOTIONS)
-def test_work_of_a_drive_in_space_is_the_strain_energy(driven, name):
-    """∫ (F·d + M·θ) dt along t d and exp(t θ), whose spin is θ all along; to the fourth order, or better."""
-    start, left = list(MOTIONS).index(name) * (1 + len(T)), []
-    for found in driven.values():
-        rows = slice(start + 1, start + 1 + len(T))
-        assert found.ok[rows].all(), found.reasons[rows]
-        work = WEIGHTS @ (found.support_reactions[rows, 0] @ np.concatenate(MOTIONS[name]))
-        left.append(abs(work / found.energy[start] - 1))
-    if name == "twisted":
-        assert max(left) < 1e-9
-    else:
-        assert left[0] / left[1] > 11
-        assert left[0] < 1e-3

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.special import ellipe, ellipk
 
 from experiments.fea import Frame, Load, Material, Member, Section, Support, condense, load_array
+from experiments.fea.equilibria import Equilibria
 from experiments.fea.nonlinear import NonlinearSolver
 
 Floats = NDArray[np.float64]
@@ -26,12 +27,14 @@ SPAN, RISE, EA, EI = 12.943, 0.386, 1.885e6, 9.27e3  # in, lb: as the file says
 COLUMNS = {"free": math.pi**2 / 4, "guided": 4 * math.pi**2, "pinned": math.pi**2}
 """Critical loads over EI/L²: Timoshenko and Gere, Theory of Elastic Stability, 2nd ed. (1961), §2.1 and 2.2."""
 
+COLUMN_NAMES = [(name, pieces) for name in COLUMNS for pieces in (1, 2)]
+
 
 def stability_frame() -> Frame:
     """Columns of length and EI one, in one piece and in two, and Williams's toggle with a half span of one."""
     nodes, members, clamps, supports = {}, [], [], []
     column = Section(1e8, 1.0, 1.0, 1.0)
-    for x, (name, pieces) in enumerate((name, pieces) for name in COLUMNS for pieces in (1, 2)):
+    for x, (name, pieces) in enumerate(COLUMN_NAMES):
         at = [f"{name}{pieces}.{i}" for i in range(pieces + 1)]
         nodes |= {node: (3.0 * x, i / pieces, 0.0) for i, node in enumerate(at)}
         for i in range(pieces):
@@ -57,24 +60,35 @@ def top(name: str, pieces: int) -> str:
     return f"{name}{pieces}.{pieces}"
 
 
-@pytest.mark.parametrize("pieces", [1, 2])
-@pytest.mark.parametrize("name", COLUMNS)
-def test_timoshenko_and_gere_critical_loads(solver, name, pieces):
+SHARES = (0.5, 0.99, 1.01, 1.5)
+
+
+@pytest.fixture(scope="module")
+def pressed(solver) -> tuple[Equilibria, Equilibria]:
+    """Each column under SHARES of its critical load, all in one solve: stable equilibria, and any."""
+    cases = [
+        [Load(top(name, pieces), force=(0, -f * COLUMNS[name], 0))] for name, pieces in COLUMN_NAMES for f in SHARES
+    ]
+    loads = load_array(solver.frame, cases)
+    return solver.solve(loads), solver.solve(loads, only_stable=False)
+
+
+@pytest.mark.parametrize(("name", "pieces"), COLUMN_NAMES)
+def test_timoshenko_and_gere_critical_loads(pressed, name, pieces):
     """A straight column is stable at 1 % less and not at 1 % more.
 
     In one piece the guided column has no free motion but its shortening: that it buckles between its ends is seen
     along the member alone. There its flexibility is integrated over kh = 2π/8 at a time, which puts the load where
     it changes sign to (kh)⁴/60 = 0.6 %.
     """
-    cases = [[Load(top(name, pieces), force=(0, -f * COLUMNS[name], 0))] for f in (0.5, 0.99, 1.01, 1.5)]
-    loads = load_array(solver.frame, cases)
-    found = solver.solve(loads)
-    assert found.ok.tolist() == [True, True, False, False]
-    assert all("unstable in one mode" in reason for reason in found.reasons[2:])
-    anyway = solver.solve(loads, only_stable=False)
-    assert anyway.ok.all()
-    assert anyway.unstable.tolist() == [0, 0, 1, 1]
-    assert_allclose(anyway.at(top(name, pieces))[:, 0], 0, atol=1e-12)
+    first = COLUMN_NAMES.index((name, pieces)) * len(SHARES)
+    rows = slice(first, first + len(SHARES))
+    found, anyway = pressed
+    assert found.ok[rows].tolist() == [True, True, False, False]
+    assert all("unstable in one mode" in reason for reason in found.reasons[rows][2:])
+    assert anyway.ok[rows].all()
+    assert anyway.unstable[rows].tolist() == [0, 0, 1, 1]
+    assert_allclose(anyway.at(top(name, pieces))[rows, 0], 0, atol=1e-12)
 
 
 def test_timoshenko_and_gere_beam_column(solver):
@@ -87,16 +101,29 @@ def test_timoshenko_and_gere_beam_column(solver):
     assert_allclose(found.at("free1.1")[:, 0], Q * (np.tan(u) - u) / (p * u), rtol=1e-4)
 
 
-@pytest.mark.parametrize("degrees", [20, 60, 100, 140])
-def test_timoshenko_and_gere_beyond_the_critical_load(solver, degrees):
-    """§2.7: P/P_cr = (2K/π)² with k = sin α/2, x/L = 2E/K − 1, y/L = 2k/K. A lateral load of 1e-4 chooses the side
-    and moves the tip by not more than itself times the compliance, which is 1/(P/P_cr − 1) at most."""
+ANGLES = (20, 60, 100, 140)
+
+
+def post_critical(degrees: float) -> list[float]:
+    """P/P_cr, x/L and y/L where the tip has turned by so much."""
     k = math.sin(math.radians(degrees) / 2)
     K, E = ellipk(k * k), ellipe(k * k)
-    exact = [(2 * K / math.pi) ** 2, 2 * E / K - 1, 2 * k / K]
-    found = solver.solve(load_array(solver.frame, [[Load("free2.2", force=(1e-4, -exact[0] * COLUMNS["free"], 0))]]))
-    assert found.ok[0], found.reasons[0]
-    tip = found.at("free2.2")[0]
+    return [(2 * K / math.pi) ** 2, 2 * E / K - 1, 2 * k / K]
+
+
+@pytest.fixture(scope="module")
+def buckled(solver) -> Equilibria:
+    loads = [(1e-4, -post_critical(degrees)[0] * COLUMNS["free"], 0) for degrees in ANGLES]
+    return solver.solve(load_array(solver.frame, [[Load("free2.2", force=force)] for force in loads]))
+
+
+@pytest.mark.parametrize("degrees", ANGLES)
+def test_timoshenko_and_gere_beyond_the_critical_load(buckled, degrees):
+    """§2.7: P/P_cr = (2K/π)² with k = sin α/2, x/L = 2E/K − 1, y/L = 2k/K. A lateral load of 1e-4 chooses the side
+    and moves the tip by not more than itself times the compliance, which is 1/(P/P_cr − 1) at most."""
+    exact, i = post_critical(degrees), ANGLES.index(degrees)
+    assert buckled.ok[i], buckled.reasons[i]
+    tip = buckled.at("free2.2")[i]
     atol = 1e-4 / (exact[0] - 1) + 2e-4
     assert_allclose([1 + tip[1], tip[0], -tip[5]], [exact[1], exact[2], math.radians(degrees)], atol=atol)
 
