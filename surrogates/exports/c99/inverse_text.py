@@ -59,28 +59,16 @@ static void ${p}_moved(const $real coded[${P}_N_FACTORS], $real value[${P}_N_FAC
 $moved
 }
 
-/* Overwrites miss with the step for which slope * step = miss. A slope near the identity needs no pivoting. */
-static void ${p}_solve($real slope[${P}_N_FACTORS][${P}_N_FACTORS], $real miss[${P}_N_FACTORS])
+/* Overwrites slope with its factors. A slope near the identity needs no pivoting. */
+static void ${p}_factor($real slope[${P}_N_FACTORS][${P}_N_FACTORS])
 {
-    for (int k = 0; k < ${P}_N_FACTORS; ++k) {
-        const $real inverse = $one / slope[k][k];
+$factor
+}
 
-        for (int i = k + 1; i < ${P}_N_FACTORS; ++i) {
-            const $real factor = slope[i][k] * inverse;
-
-            for (int j = k + 1; j < ${P}_N_FACTORS; ++j) {
-                slope[i][j] -= factor * slope[k][j];
-            }
-            miss[i] -= factor * miss[k];
-        }
-        slope[k][k] = inverse;
-    }
-    for (int k = ${P}_N_FACTORS - 1; k >= 0; --k) {
-        for (int j = k + 1; j < ${P}_N_FACTORS; ++j) {
-            miss[k] -= slope[k][j] * miss[j];
-        }
-        miss[k] *= slope[k][k];
-    }
+/* Overwrites miss with the step for which slope * step = miss; slope as ${p}_factor left it. */
+static void ${p}_substitute($real slope[${P}_N_FACTORS][${P}_N_FACTORS], $real miss[${P}_N_FACTORS])
+{
+$substitute
 }
 
 /* As the inverse, but writes what it tried whatever the status. */
@@ -98,15 +86,30 @@ static int ${p}_search(const $real responses[${P}_N_RESPONSES], $real settings[$
         coded[j] = ${p}_within(wanted[j], $limit);
     }
     for (int k = 0; k < $steps && moving; ++k) {
+        int near = 1;
+
         ${p}_moved(coded, step, slope);
         for (int j = 0; j < ${P}_N_FACTORS; ++j) {
             step[j] = wanted[j] - step[j];
         }
-        ${p}_solve(slope, step);
-        moving = 0;
+        ${p}_factor(slope);
+        ${p}_substitute(slope, step);
         for (int j = 0; j < ${P}_N_FACTORS; ++j) {
             coded[j] = ${p}_within(coded[j] + step[j], $limit);
-            moving |= !(step[j] < $still && step[j] > -$still);
+            near &= step[j] < $near && step[j] > -$near;
+        }
+        if (near) {
+            /* One more step with the same slope: its error is the product of this one's and the last one's. */
+            ${p}_moved_to(coded, step);
+            for (int j = 0; j < ${P}_N_FACTORS; ++j) {
+                step[j] = wanted[j] - step[j];
+            }
+            ${p}_substitute(slope, step);
+            moving = 0;
+            for (int j = 0; j < ${P}_N_FACTORS; ++j) {
+                coded[j] = ${p}_within(coded[j] + step[j], $limit);
+                moving |= !(step[j] < $still && step[j] > -$still);
+            }
         }
     }$chords
 $decoding
@@ -114,6 +117,30 @@ $decoding
     return status == ${P}_OK || !moving ? status : ${P}_NOT_CONVERGED;
 }
 """
+
+FACTOR = """\
+    for (int k = 0; k < ${P}_N_FACTORS; ++k) {
+        slope[k][k] = $one / slope[k][k];
+        for (int i = k + 1; i < ${P}_N_FACTORS; ++i) {
+            slope[i][k] *= slope[k][k];
+            for (int j = k + 1; j < ${P}_N_FACTORS; ++j) {
+                slope[i][j] -= slope[i][k] * slope[k][j];
+            }
+        }
+    }"""
+
+SUBSTITUTE = """\
+    for (int i = 0; i < ${P}_N_FACTORS; ++i) {
+        for (int j = 0; j < i; ++j) {
+            miss[i] -= slope[i][j] * miss[j];
+        }
+    }
+    for (int i = ${P}_N_FACTORS - 1; i >= 0; --i) {
+        for (int j = i + 1; j < ${P}_N_FACTORS; ++j) {
+            miss[i] -= slope[i][j] * miss[j];
+        }
+        miss[i] *= slope[i][i];
+    }"""
 
 CHORDS = """
     if (moving) {

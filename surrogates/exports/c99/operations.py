@@ -63,11 +63,15 @@ def _step(parts: "Parts") -> Counts:
         return 0, 0, 0
     if parts.moved is not None:
         one = parts.moved.count(slopes=True)
-        # Elimination: row by row factors, the rest of the matrix and the right side; then substitution.
-        eliminated = sum((n - 1 - k) * (n - 1 - k) + 2 * (n - 1 - k) for k in range(n))
-        substituted = n * (n - 1) // 2 + n
-        inner = sum((n - 1 - k) * (n - k) for k in range(n)) + n * (n - 1) // 2
-        return one.multiplications + eliminated + substituted, one.additions + inner + 2 * n, n
+        # Factors: multipliers and the rest of the matrix. Then, as the worst, two substitutions and a value more.
+        again = parts.moved.count(slopes=False)
+        inner = sum((n - 1 - k) * (n - 1 - k) for k in range(n))
+        factors, substituted = inner + n * (n - 1) // 2, n * (n - 1)
+        return (
+            one.multiplications + again.multiplications + factors + 2 * (substituted + n),
+            one.additions + again.additions + inner + 2 * substituted + 4 * n,
+            n,
+        )
     one, rank = parts.forward.count(slopes=True), min(n, m)
     # Gram–Schmidt: for each row taken, all squares, then the step and the other rows without their share.
     per_row = (m * n + 2 * n + m * (2 * n + 2), m * n + n + m * (2 * n + 1), 1)

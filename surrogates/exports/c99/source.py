@@ -13,6 +13,7 @@ from ..base import plain
 from ..inverse_plan import InversePlan, inverse_plan
 from . import inverse_text as inverse_text
 from . import text as text
+from .elimination import MOST, factor_text, substitute_text
 from .polynomials import Polynomials, body, columns_text, polynomials, table_text
 from .precision import Precision, box, tolerance
 from .printing import affine_sum
@@ -99,7 +100,7 @@ class Parts:
         if self.plan.affine:
             return inverse_text.CLOSED_SEARCH
         kind = inverse_text.CONTRACTING_SEARCH if self.plan.contracting else inverse_text.FREE_SEARCH
-        return inverse_text.WITHIN + (inverse_text.MOVED_TO if self.plan.chords else "") + kind
+        return inverse_text.WITHIN + (inverse_text.MOVED_TO if self.plan.contracting else "") + kind
 
     def _common(self) -> dict[str, str]:
         c, model, p = self.precision.printer, self.model, self.names["p"]
@@ -186,6 +187,8 @@ class Parts:
             ),
             "moved": moved,
             "moved_to": moved_to,
+            "near": c.number(precision.near),
+            **self._elimination(),
             "per_scale": c.list(1.0 / model.scale),
             "rank": str(min(len(model.factors), len(model.responses))),
             "steps": str(plan.steps),
@@ -200,6 +203,15 @@ class Parts:
             "one": c.number(1.0),
             "zero": c.number(0.0),
         }
+
+    def _elimination(self) -> dict[str, str]:
+        """Factors and substitution, written out where the unknowns are few."""
+        c, n = self.precision.printer, len(self.model.factors)
+        if n <= MOST:
+            return {"factor": factor_text(n, c), "substitute": substitute_text(n, c)}
+        names = {**self.names, "one": c.number(1.0)}
+        texts = {"factor": inverse_text.FACTOR, "substitute": inverse_text.SUBSTITUTE}
+        return {key: Template(text).substitute(names) for key, text in texts.items()}
 
     def _moves(self) -> str:
         """``moves[i] = Σ gain · (response − value at the centre)``, structural zeros left out."""

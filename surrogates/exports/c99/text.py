@@ -158,10 +158,10 @@ static int ${p}_code(const $real settings[${P}_N_FACTORS], $real coded[${P}_N_FA
 $coding
 
     for (int j = 0; j < ${P}_N_FACTORS; ++j) {
-        if (!${p}_finite(settings[j])) {
-            return ${P}_NOT_FINITE;
-        }
         if (!(coded[j] <= $box && coded[j] >= -$box)) {
+            if (!${p}_finite(settings[j])) {
+                return ${P}_NOT_FINITE;
+            }
             status = ${P}_OUTSIDE_DOMAIN;
         }
     }

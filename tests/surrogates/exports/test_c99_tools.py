@@ -9,6 +9,7 @@ import pytest
 
 from surrogates import certify
 from surrogates.exports import get
+from surrogates.exports.c99.elimination import MOST
 from surrogates.exports.verification import Outcome, verify
 from tests.surrogates.cases import ALL, box, square_quadratic, surrogate, unit_box
 
@@ -28,14 +29,19 @@ def certified(model):
     return replace(model, certificate=certify(model))
 
 
-def mild(n: int = 3, seed: int = 0) -> "object":
+def mild(n: int = 3, seed: int = 0, spread: float = 0.2):
     """A certified cubic map of n factors whose Newton steps are counted."""
     rng = np.random.default_rng(seed)
     labels = ["1", *(f"f{i}" for i in range(n)), *(f"f{i}^3" for i in range(n)), "f0:f1"]
     coefficients = np.zeros((n, len(labels)))
-    coefficients[:, 1 : n + 1] = np.eye(n) + 0.2 * rng.uniform(-1, 1, (n, n))
+    coefficients[:, 1 : n + 1] = np.eye(n) + spread * rng.uniform(-1, 1, (n, n))
     coefficients[:, n + 1 :] = 0.03 * rng.uniform(-1, 1, (n, n + 1))
     return certified(surrogate(unit_box(n), labels, coefficients.tolist()))
+
+
+def wide():
+    """The same of more factors than elimination is written out for."""
+    return mild(9, spread=0.05)
 
 
 def strong(seed: int = 4):
@@ -55,12 +61,14 @@ def logarithms():
 
 CASES = {
     **{name: lambda make=make: certified(make()) for name, make in ALL.items()},
-    "mild": mild, "strong": strong, "logarithms": logarithms,
+    "mild": mild, "wide": wide, "strong": strong, "logarithms": logarithms,
 }  # fmt: skip
 
 
 def test_the_cases_are_what_they_are_called():
     assert mild().certificate.newton_iterations
+    assert wide().certificate.chord_iterations
+    assert len(wide().factors) > MOST
     assert strong().certificate.newton_iterations is None
     assert strong().certificate.chord_iterations
 
@@ -96,7 +104,7 @@ def written(folder, precision, model, extra=""):
 
 @need("cppcheck")
 @pytest.mark.parametrize("precision", PRECISIONS)
-@pytest.mark.parametrize("name", ["hexflex_like", "mild", "strong", "logarithms", "underdetermined"])
+@pytest.mark.parametrize("name", ["hexflex_like", "mild", "wide", "strong", "logarithms", "underdetermined"])
 def test_cppcheck_finds_nothing(name, precision, tmp_path):
     source, test = written(tmp_path, precision, CASES[name]())
     flags = ["--enable=all", "--inconclusive", "--std=c99", "--error-exitcode=9", "--suppress=missingIncludeSystem",
@@ -111,7 +119,7 @@ def test_cppcheck_finds_nothing(name, precision, tmp_path):
 
 @pytest.mark.skipif(not COMPILERS, reason="NEITHER GCC NOR CLANG FOUND: no sanitizer was run")
 @pytest.mark.parametrize("precision", PRECISIONS)
-@pytest.mark.parametrize("name", ["hexflex_like", "mild", "strong", "logarithms", "underdetermined"])
+@pytest.mark.parametrize("name", ["hexflex_like", "mild", "wide", "strong", "logarithms", "underdetermined"])
 def test_sanitizers_find_nothing(name, precision, tmp_path):
     source, test = written(tmp_path, precision, CASES[name]())
     for compiler in COMPILERS:
