@@ -181,7 +181,7 @@ static void ${p}_least_norm($real slope[${P}_N_RESPONSES][${P}_N_FACTORS],
     $real miss[${P}_N_RESPONSES], $real step[${P}_N_FACTORS])
 {
     int done[${P}_N_RESPONSES] = {0};
-    $real longest = $zero;
+    $real least = $zero;
 
     for (int j = 0; j < ${P}_N_FACTORS; ++j) {
         step[j] = $zero;
@@ -200,9 +200,11 @@ static void ${p}_least_norm($real slope[${P}_N_RESPONSES][${P}_N_FACTORS],
                 square = sum;
             }
         }
-        longest = k == 0 ? square : longest;
-        if (row < 0 || square <= $dependent * longest) {
+        if (row < 0 || square <= least) {
             return;
+        }
+        if (k == 0) {
+            least = $dependent * square;
         }
         done[row] = 1;
         square = $one / square;
