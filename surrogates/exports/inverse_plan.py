@@ -46,7 +46,8 @@ class InversePlan:
     4. The answer must lie in the domain to `box`. Rounding beyond the ranges is taken off; it is good if the
        polynomials then give the target to `tolerance`. Anything else is refused with a status.
 
-    Step 1 is the Newton step from the centre of the domain.
+    Step 1 is the Newton step from the centre of the domain. C ends 2 sooner where the plan is `contracting`: after a
+    small step with one more of the same slope, whose error is the product of both steps'.
 
     Parameters
     ----------

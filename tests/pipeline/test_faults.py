@@ -29,6 +29,7 @@ from pipeline.lock import LOCK, FolderLock, Owner, holder
 from pipeline.points import PointStore
 from pipeline.store import RunFolder
 from tests.pipeline.cases import Counted, config_text, contents, reproducible
+from tests.pipeline.slow_study import HOLD
 
 ROOT = Path(__file__).parents[2]
 
@@ -315,12 +316,17 @@ class TestTwoRuns:
 
     @needs_fork
     def test_in_two_processes(self, server, whole, tmp_path, run):
+        hold = tmp_path / f"notes{HOLD}"
+        hold.touch()
         child = server.begin(tmp_path / "run", tmp_path / "notes.txt")
-        until = time.monotonic() + 20.0
+        until = time.monotonic() + 60.0
         while not asked(tmp_path / "notes.txt") and time.monotonic() < until:
             time.sleep(0.005)
-        with pytest.raises(InputError, match=f"another run is at work .*process {child} on "):
-            FolderLock(tmp_path / "run")
+        try:
+            with pytest.raises(InputError, match=f"another run is at work .*process {child} on "):
+                FolderLock(tmp_path / "run")
+        finally:
+            hold.unlink()
         assert server.end() == 0
         assert reproducible(tmp_path / "run") == reproducible(whole[0])
 
