@@ -4,7 +4,7 @@ import json
 import re
 import textwrap
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, ClassVar, Protocol, runtime_checkable
 
 from experiments.naming import check_name
@@ -74,6 +74,17 @@ def number(value: float) -> str:
     if not abs(value) < float("inf"):
         raise ValueError("this model cannot be exported: a number derived from its coefficients overflows float64")
     return repr(value + 0.0)
+
+
+def filled(parts: Iterable[str], width: int) -> list[str]:
+    """Parts, none of them broken, joined by blanks into lines of at most `width` characters where that is possible."""
+    lines: list[str] = []
+    for part in parts:
+        if lines and len(lines[-1]) + 1 + len(part) <= width:
+            lines[-1] += f" {part}"
+        else:
+            lines.append(part)
+    return lines
 
 
 def about(model: "Surrogate") -> list[str]:

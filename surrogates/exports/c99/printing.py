@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base import number
+from ..base import filled, number
 from ..horner import Assignment, Entry, Product
 
-WIDTH = 108
+LINE = 88
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class Printer:
         if not parts:
             return self.number(0.0)
         first = parts[0].removeprefix("+ ").replace("- ", "-", 1)
-        return f"\n{indent}".join(_lines((first, *parts[1:])))
+        return f"\n{indent}".join(filled((first, *parts[1:]), LINE))
 
     def assignment(self, one: Assignment, indent: str) -> str:
         """A constant with its value."""
@@ -94,14 +94,3 @@ SINGLE = Printer("float", "f", "FLT_MAX")
 def affine_sum(constant: float, factors: ArrayLike, names: Sequence[str]) -> tuple[Product, ...]:
     """``constant + Σ factor · name`` as products."""
     return ((float(constant), ()), *((float(f), (n,)) for f, n in zip(np.asarray(factors), names, strict=True)))
-
-
-def _lines(parts: Iterable[str]) -> list[str]:
-    """Parts joined by blanks into lines that are not too long."""
-    lines: list[str] = []
-    for part in parts:
-        if lines and len(lines[-1]) + 1 + len(part) <= WIDTH - 20:
-            lines[-1] += f" {part}"
-        else:
-            lines.append(part)
-    return lines

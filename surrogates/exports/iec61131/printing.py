@@ -8,7 +8,7 @@ import re
 import textwrap
 from collections.abc import Iterable, Sequence
 
-from ..base import number, plain
+from ..base import filled, number, plain
 from ..horner import Assignment, Product
 
 WIDTH = 100
@@ -50,7 +50,7 @@ def total(products: Iterable[Product], indent: str) -> str:
     if not parts:
         return literal(0.0)
     first = parts[0].removeprefix("+ ").replace("- ", "-", 1)
-    return f"\n{indent}".join(_filled((first, *parts[1:])))
+    return f"\n{indent}".join(filled((first, *parts[1:]), WIDTH - 20))
 
 
 def assignment(one: Assignment, indent: str) -> str:
@@ -98,14 +98,3 @@ def _value(coefficient: object) -> float:
     if not isinstance(coefficient, float):
         raise TypeError(f"structured text is written with numbers, not with entries of tables; got {coefficient!r}")
     return coefficient
-
-
-def _filled(parts: Iterable[str]) -> list[str]:
-    """Parts joined by blanks into lines that are not too long."""
-    lines: list[str] = []
-    for part in parts:
-        if lines and len(lines[-1]) + 1 + len(part) <= WIDTH - 20:
-            lines[-1] += f" {part}"
-        else:
-            lines.append(part)
-    return lines
