@@ -25,7 +25,8 @@ MOST_PRINTED = 256 * 2**20
 """Bytes that a program may print; one that runs wild would fill the disk."""
 
 _LONGEST_PAUSE = 0.05
-_ROUNDS = 20
+_LONGEST_DEATH = 10.0
+"""Seconds for what was killed to be gone: a large memory takes long to free, a hung disk for ever."""
 
 
 class End(Enum):
@@ -123,9 +124,12 @@ def _end(process: subprocess.Popen, mark: str, grace: float) -> None:
         until = time.monotonic() + grace
         while time.monotonic() < until and (not _has_ended(process) or _living(process.pid, mark)):
             time.sleep(_LONGEST_PAUSE)
-    for _ in range(_ROUNDS):  # one that forks while it is being killed needs more than one round
+    seen: set[int] = set()
+    until = time.monotonic() + _LONGEST_DEATH
+    while time.monotonic() < until:  # one that forks while it is being killed needs more than one round
         _signal(process.pid, living := _living(process.pid, mark), signal.SIGKILL)
-        if not living and _has_ended(process):
+        seen = {number for number in seen.union(living) if _is_living(number)}
+        if not seen and _has_ended(process):
             break
         time.sleep(1e-3)
     process.wait()
@@ -138,6 +142,14 @@ def _signal(leader: int, others: Sequence[int], what: signal.Signals) -> None:
     for number in others:
         with suppress(ProcessLookupError, PermissionError):
             os.kill(number, what)
+
+
+def _is_living(number: int) -> bool:
+    """Whether a process still runs; one that is dying has lost its environment, and so its mark, before that."""
+    try:
+        return (Path("/proc") / str(number) / "stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except (OSError, UnicodeDecodeError, IndexError):
+        return False
 
 
 def _living(leader: int, mark: str) -> list[int]:
