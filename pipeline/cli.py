@@ -13,7 +13,7 @@ from .version import __version__
 
 EPILOG = (
     "exit codes: 0 done; 2 bad config or arguments; 3 too many failed runs; "
-    "4 a declared requirement is not met; 1 a bug of ours; 130 stopped by Ctrl-C"
+    "4 a declared requirement is not met; 1 the disk or the cluster failed, or a bug of ours; 130 stopped by Ctrl-C"
 )
 
 

@@ -152,6 +152,29 @@ class ExportTable(Table):
     verify: bool = Field(default=True, description="run what was generated against the model, with the tools at hand")
 
 
+class ExecutorTable(Table):
+    """Where the points are answered. It changes no answer, so a run may be continued elsewhere."""
+
+    name: Literal["in_process", "processes", "dask"] = Field(
+        default="in_process",
+        description="in_process: one after the other, or vectorised; processes: in workers on this machine; dask: on "
+        "the workers of a Dask cluster",
+    )
+    workers: int | None = Field(default=None, ge=1, le=4096, description="worker processes; all cores if not given")
+    address: str | None = Field(
+        default=None,
+        min_length=1,
+        description="Dask scheduler, such as tcp://head:8786, or the path of its scheduler file, *.json; a cluster is "
+        "started on this machine if not given",
+    )
+    batch: int | None = Field(
+        default=None,
+        ge=1,
+        le=100_000,
+        description="points per task; as many as the oracle answers together if not given",
+    )
+
+
 class Config(Table):
     """A study, as written by a person."""
 
@@ -167,6 +190,12 @@ class Config(Table):
     require: RequireTable = RequireTable()
     command: CommandTable = CommandTable()
     export: ExportTable = ExportTable()
+    executor: ExecutorTable = ExecutorTable()
+
+    @property
+    def of_answers(self) -> "Config":
+        """Without what changes no answer: two configs that agree in this belong to the same run folder."""
+        return self.model_copy(update={"executor": ExecutorTable()})
 
 
 def load_config(path: str | Path, overrides: Sequence[str] = ()) -> Config:
@@ -296,8 +325,8 @@ def _model_in(hint: Any) -> Any:
 
 
 def differences(ours: Config, theirs: Config) -> list[str]:
-    """Dotted keys in which two configs differ."""
-    return sorted(_differ(ours.model_dump(), theirs.model_dump(), ""))
+    """Dotted keys in which two configs differ, of those that answers may depend on."""
+    return sorted(_differ(ours.of_answers.model_dump(), theirs.of_answers.model_dump(), ""))
 
 
 def _differ(a: Mapping[str, Any], b: Mapping[str, Any], prefix: str) -> set[str]:

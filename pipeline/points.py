@@ -5,7 +5,7 @@ import json
 import os
 import socket
 import sqlite3
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
@@ -29,6 +29,22 @@ class Answer(NamedTuple):
     values: list[float]
     status: Status
     reason: str
+
+
+class Evaluated(NamedTuple):
+    """A batch that was answered: its keys, settings (n, n_factors) and answers; wall time per point [s]; by whom."""
+
+    keys: Sequence[str]
+    points: NDArray[np.float64]
+    answers: Answers
+    seconds: float
+    worker: str
+
+
+def identity(oracle: Oracle) -> str:
+    """All that an answer depends on but the settings: the oracle's name, version, parameters, and labels, in order."""
+    labels = [r.label for r in oracle.responses]
+    return json.dumps([oracle.name, oracle.version, oracle.parameters, oracle.factors.labels, labels], sort_keys=True)
 
 
 class PointStore:
@@ -66,16 +82,7 @@ class PointStore:
     ) -> None:
         self.path, self.cache, self.retry, self.shared = path, cache, frozenset(retry), shared
         self.warn: Callable[[str], None] = lambda sentence: None
-        self._identity = json.dumps(
-            [
-                oracle.name,
-                oracle.version,
-                oracle.parameters,
-                oracle.factors.labels,
-                [r.label for r in oracle.responses],
-            ],
-            sort_keys=True,
-        )
+        self._identity = identity(oracle)
         self._n_responses = len(oracle.responses)
         self._tried: set[str] = set()
         self._worker = f"{socket.gethostname()}:{os.getpid()}"
@@ -139,37 +146,35 @@ class PointStore:
     def add(
         self, keys: Sequence[str], points: NDArray[np.float64], answers: Answers, seconds: float = 0.0
     ) -> dict[str, Answer]:
-        """Store one batch in one transaction, here and in the cache; gives the answers as they will be read back.
+        """As :meth:`add_all`, of one batch that was answered in this process."""
+        return self.add_all([Evaluated(keys, points, answers, seconds, self._worker)])
 
-        Parameters
-        ----------
-        keys : sequence of str, length n
-        points : ndarray, shape (n, n_factors)
-        answers : Answers
-        seconds : float
-            Wall time per point [s].
+    def add_all(self, batches: Sequence[Evaluated]) -> dict[str, Answer]:
+        """Store batches in one transaction, here and in the cache; gives the answers as they will be read back.
 
         Raises
         ------
         OSError
-            If the disk refuses: this batch is lost, and none before it.
+            If the disk refuses: these batches are lost, and none before them.
         """
-        batch = []
-        for key, point, values, status, reason in zip(keys, points.tolist(), *answers, strict=True):
+        rows = [row for batch in batches for row in self._rows(batch)]
+        try:
+            self._write(rows)
+        except KeyboardInterrupt:
+            self._write(rows)  # it was paid for; to write it twice does no harm
+            raise
+        finally:
+            self._tried.update(row.key for row in rows)
+        self._cached(lambda cache: cache._write(rows))
+        return {row.key: self._answer(row) for row in rows}
+
+    def _rows(self, batch: Evaluated) -> Iterator[Row]:
+        for key, point, values, status, reason in zip(batch.keys, batch.points.tolist(), *batch.answers, strict=True):
             numbers = [float(v) if np.isfinite(v) else None for v in values]
             # What no UTF-8 can hold would not come back as it went in.
             told = reason.encode("utf-8", "replace").decode()
             settings, responses = json.dumps(point), json.dumps(numbers)
-            batch.append(Row(key, self._identity, settings, responses, str(status), told, seconds, self._worker))
-        try:
-            self._write(batch)
-        except KeyboardInterrupt:
-            self._write(batch)  # it was paid for; to write it twice does no harm
-            raise
-        finally:
-            self._tried.update(keys)
-        self._cached(lambda cache: cache._write(batch))
-        return {row.key: self._answer(row) for row in batch}
+            yield Row(key, self._identity, settings, responses, str(status), told, batch.seconds, batch.worker)
 
     def _cached(self, act: Callable[["PointStore"], Any]) -> Any:
         """Do something with the cache; a cache that fails on the way is done without, for the folder is complete."""

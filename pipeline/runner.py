@@ -13,10 +13,10 @@ from experiments.screening import Adequacy, Screening
 from surrogates import RoundTrip, Surrogate, dumps, loads, obstacle
 from surrogates.exports.verification import Outcome as Verified
 
-from . import exporting, stages, tables
+from . import executors, exporting, stages, tables
 from .config import FitTable, load_config
 from .errors import FlexdoceError, InputError
-from .executors import Progress, execute, silent
+from .executors import Executor, Progress, execute, silent
 from .growth import Grown, grow, wider
 from .monitor import Monitor
 from .points import PointStore
@@ -142,18 +142,21 @@ def run(
         folder,
         folder.points(study.oracle, shared, retry) as points,
         Monitor(folder, study.config.name, progress) as monitor,
+        executors.make(study.config, study.oracle, folder.path / WORK, monitor.note) as executor,
     ):
         points.warn = monitor.note
         for sentence in filter(None, (folder.taken_over, points.strangers())):
             monitor.note(sentence)
-        return _Runner(study, folder, points, monitor).run()
+        return _Runner(study, folder, points, monitor, executor).run()
 
 
 class _Runner:
     """One pass through the stages."""
 
-    def __init__(self, study: Study, folder: RunFolder, points: PointStore, monitor: Monitor) -> None:
-        self.study, self.folder, self.points, self.monitor = study, folder, points, monitor
+    def __init__(
+        self, study: Study, folder: RunFolder, points: PointStore, monitor: Monitor, executor: Executor
+    ) -> None:
+        self.study, self.folder, self.points, self.monitor, self.executor = study, folder, points, monitor, executor
         self.seconds: dict[str, float] = {}
         self.fit_runs: Runs | None = None
         self.is_again = study.config.require.max_runs is not None and (folder.path / "model.json").is_file()
@@ -195,9 +198,12 @@ class _Runner:
 
     def _executed(self, stage: str, design: Design) -> Runs:
         self.folder.write(f"{stage}/design.csv", tables.design_csv(design))
-        runs = execute(self.study.oracle, design, self.points, stage, self.monitor.tally)
+        runs = self._answered(stage, design)
         self._write_runs(stage, runs)
         return runs
+
+    def _answered(self, stage: str, design: Design) -> Runs:
+        return execute(self.study.oracle, design, self.points, stage, self.monitor.tally, self.executor)
 
     def _write_runs(self, stage: str, runs: Runs) -> None:
         self.folder.write(f"{stage}/design.csv", tables.design_csv(runs.design))
@@ -240,7 +246,7 @@ class _Runner:
         """As `_executed`, but the files of a finished study stay as they are until its last round is there again."""
         if not self.is_again:
             return self._executed(stage, design)
-        return execute(self.study.oracle, design, self.points, stage, self.monitor.tally)
+        return self._answered(stage, design)
 
     def _round_trip(self, model: Surrogate, validation_runs: Runs) -> RoundTrip:
         targets, inversion, design = stages.inversion_design(model, validation_runs)

@@ -261,5 +261,5 @@ def provenance(study: Study, kept: tuple[str, ...]) -> dict[str, Any]:
         "oracle_parameters": oracle.parameters,
         "seed": config.seed,
         "kept_factors": list(kept),
-        "config_sha256": hashlib.sha256(dump_config(config).encode()).hexdigest(),
+        "config_sha256": hashlib.sha256(dump_config(config.of_answers).encode()).hexdigest(),
     }

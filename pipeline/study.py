@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from importlib.util import find_spec
 from math import ceil
 from pathlib import Path
 from typing import Any, TypeVar
@@ -170,6 +171,7 @@ def resolve(config: Config) -> Study:
     _check_growth(study)
     _check_exports(study)
     _check_command(study)
+    _check_executor(config)
     return study
 
 
@@ -186,6 +188,13 @@ def _oracle(config: Config) -> Oracle:
         raise InputError("oracle.parameters: a program has none; write what it needs into argv or a template")
     settings = table.command.settings
     return _checked("oracle.command", lambda: oracles.get("command", **settings))
+
+
+def made_oracle(config: Config, place: Path) -> Oracle:
+    """A study's oracle made anew, as :func:`ready` has it, in another process."""
+    oracle: Any = _oracle(config)
+    oracle.prepare()
+    return oracle.working_in(place) if hasattr(oracle, "working_in") else oracle
 
 
 def ready(study: Study, place: Path) -> Study:
@@ -318,6 +327,19 @@ def _check_exports(study: Study) -> None:
     for name in study.config.export.targets:
         target = _checked("export.targets", lambda name=name: exports.get(name))
         _checked("export.prefix", lambda target=target: target.render(blank, study.export_prefix))
+
+
+def _check_executor(config: Config) -> None:
+    """Refuse settings of an executor that do not go together, and one that is not installed."""
+    table = config.executor
+    if table.address is not None and table.name != "dask":
+        raise InputError(f"executor.address belongs to executor.name = 'dask', not {table.name!r}")
+    if table.address is not None and table.workers is not None:
+        raise InputError("executor.workers: a cluster that has an address has its own workers; leave one of them out")
+    if table.name == "in_process" and (table.workers is not None or table.batch is not None):
+        raise InputError("executor.workers and executor.batch belong to executor.name = 'processes' or 'dask'")
+    if table.name == "dask" and find_spec("distributed") is None:
+        raise InputError("executor.name = 'dask' needs the package distributed; install flexdoce[dask]")
 
 
 def _checked(where: str, make: Callable[[], T]) -> T:

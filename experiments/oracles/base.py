@@ -168,13 +168,21 @@ class Oracle(ABC):
                 f"oracle {self.name!r} has the factors {', '.join(self.factors.labels)}; "
                 f"the design has {', '.join(design.space.labels)}"
             )
-        values, status, reasons = self.evaluate(design.physical)
+        values, status, reasons = self.answer(design.physical)
+        return Runs(design, self.responses, values, tuple(status), tuple(reasons))
+
+    def answer(self, points: NDArray[np.float64]) -> Answers:
+        """Answer points in physical units, shape (n, n_factors); what is not finite has failed."""
+        values, status, reasons = self.evaluate(points)
         values = np.array(values, dtype=np.float64)
         for i in np.flatnonzero(~np.isfinite(values).all(axis=1)):
             if status[i] is Status.OK:
                 bad = [r.name for r, v in zip(self.responses, values[i], strict=True) if not np.isfinite(v)]
                 status[i], reasons[i] = Status.NON_FINITE, f"{', '.join(bad)} not finite"
-        return Runs(design, self.responses, values, tuple(status), tuple(reasons))
+        return Answers(values, status, reasons)
+
+    def interrupt(self) -> None:  # noqa: B027 - what runs in this process ends with it
+        """End what other threads run for this oracle outside of this process."""
 
 
 class PointOracle(Oracle):

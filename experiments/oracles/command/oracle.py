@@ -127,6 +127,10 @@ class CommandOracle(Oracle):
                 values[i] = verdict.values
         return Answers(values, [v.status for v in found], [v.reason for v in found])
 
+    def interrupt(self) -> None:
+        """End every program that runs in another thread."""
+        process.end_all()
+
     def openly(self, point: Sequence[float]) -> list[str]:
         """What would be run and written at `point`, shape (n_factors,), a line each; nothing is."""
         program, settings = self.settings.program, self.settings

@@ -24,6 +24,9 @@ MARK = "FLEXDOCE_POINT"
 MOST_PRINTED = 256 * 2**20
 """Bytes that a program may print; one that runs wild would fill the disk."""
 
+_RUNNING: dict[str, subprocess.Popen] = {}
+"""By mark, what runs at this moment, in whatever thread."""
+
 _LONGEST_PAUSE = 0.05
 _LONGEST_DEATH = 10.0
 """Seconds for what was killed to be gone: a large memory takes long to free, a hung disk for ever."""
@@ -90,12 +93,20 @@ def run(argv: Sequence[str], folder: WorkFolder, variables: Mapping[str, str], l
         for sink in sinks:
             os.close(sink)
     grace_left = 0.0  # when interrupted, at once
+    _RUNNING[mark] = process
     try:
         how = _watch(process, started + limit, lambda: folder.size(STDOUT) + folder.size(STDERR) > MOST_PRINTED)
         grace_left = 0.0 if how is End.BY_ITSELF else grace
     finally:
+        del _RUNNING[mark]
         _end(process, mark, grace_left)
     return Ended(how, process.returncode, time.monotonic() - started)
+
+
+def end_all() -> None:
+    """End what runs for other threads of this process, which is about to end itself or has no use for it."""
+    for mark, running in list(_RUNNING.items()):
+        _signal(running.pid, _living(running.pid, mark), signal.SIGKILL)
 
 
 def _watch(process: subprocess.Popen, until: float, prints_too_much: Callable[[], bool]) -> End:

@@ -1,4 +1,4 @@
-"""How a design is run: what is known is read back, the rest is answered batch by batch and stored at once."""
+"""How a design is run: what is known is read back, the rest is answered, and stored as it comes."""
 
 import time
 from collections import Counter
@@ -8,11 +8,13 @@ from typing import Protocol
 import numpy as np
 
 from experiments.designs import Design
-from experiments.oracles import Answers, Oracle
+from experiments.oracles import Oracle
 from experiments.runs import Runs, Status
 
-from .points import Answer, PointStore
-from .tally import Tally
+from ..points import Answer, Evaluated, PointStore
+from ..tally import Tally
+from .base import Answered, Batch, Executor
+from .in_process import InProcess
 
 
 class Progress(Protocol):
@@ -35,9 +37,14 @@ def untold(tally: Tally) -> None:
 
 
 def execute(
-    oracle: Oracle, design: Design, store: PointStore, stage: str, tell: Callable[[Tally], None] = untold
+    oracle: Oracle,
+    design: Design,
+    store: PointStore,
+    stage: str,
+    tell: Callable[[Tally], None] = untold,
+    executor: Executor | None = None,
 ) -> Runs:
-    """Run `design` in this process.
+    """Run `design`, in this process if no executor is given.
 
     A point that was answered before by the same oracle, in this folder or in the cache, is not run again.
     What is used is what was stored, so that a run that is continued cannot differ.
@@ -47,24 +54,28 @@ def execute(
     answers = store.known(keys)
     # A design may hold the same settings twice; they are paid for once.
     first = {key: i for i, key in reversed(list(enumerate(keys)))}
-    missing = np.array(sorted(i for key, i in first.items() if key not in answers), dtype=int)
+    missing = sorted(i for key, i in first.items() if key not in answers)
     count = _Count(stage, Counter(keys), answers)
     tell(count.tally())
-    for start in range(0, len(missing), oracle.batch):
-        rows = missing[start : start + oracle.batch]
-        began = time.monotonic()
-        runs = oracle(design.take(rows))
-        seconds = (time.monotonic() - began) / len(rows)
-        batch = Answers(runs.values, list(runs.status), list(runs.reasons))
-        added = store.add([keys[i] for i in rows], points[rows], batch, seconds)
+
+    def keep(arrived: Sequence[Answered]) -> None:
+        added = store.add_all([_evaluated(found, keys) for found in arrived])
         answers.update(added)
         count.add(added)
-        failed = [(i, answers[keys[i]]) for i in rows]
-        tell(
-            count.tally(
-                [f"run {i + 1} failed: {a.status} ({a.reason})" for i, a in failed if a.status is not Status.OK]
-            )
-        )
+        rows = sorted(row for found in arrived for row in found.batch.rows)
+        failed = [(i, answers[keys[i]]) for i in rows if answers[keys[i]].status is not Status.OK]
+        tell(count.tally([f"run {i + 1} failed: {a.status} ({a.reason})" for i, a in failed]))
+
+    executor = executor or InProcess(oracle)
+    size = executor.size(oracle.batch)
+    chunks = (tuple(missing[start : start + size]) for start in range(0, len(missing), size))
+    try:
+        for arrived in executor.run(Batch(rows, points[list(rows)]) for rows in chunks):
+            keep(arrived)
+    except KeyboardInterrupt:
+        if left := executor.arrived():
+            keep(left)
+        raise
     ordered = [answers[key] for key in keys]
     return Runs(
         design,
@@ -73,6 +84,11 @@ def execute(
         tuple(a.status for a in ordered),
         tuple(a.reason for a in ordered),
     )
+
+
+def _evaluated(found: Answered, keys: Sequence[str]) -> Evaluated:
+    batch = found.batch
+    return Evaluated([keys[i] for i in batch.rows], batch.points, found.answers, found.seconds, found.worker)
 
 
 class _Count:

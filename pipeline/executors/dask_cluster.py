@@ -1,0 +1,205 @@
+"""The workers of a Dask cluster: one that is there, by its address, or one that is started on this machine."""
+
+import errno
+import logging
+import queue
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
+from typing import Any
+
+from ..errors import FlexdoceError, InputError
+from . import worker
+from .base import Answered, Backlog, Batch, Executor
+from .worker import Recipe
+
+LEAST_AHEAD, MOST_AHEAD, HORIZON = 2, 50, 0.2
+"""Batches for every thread of a worker: the one it answers and the next; of quick ones, as many as last 0.2 s."""
+
+PATIENCE = 20.0
+"""Seconds that a scheduler may take to answer."""
+
+LOOK_EVERY, LONELY = 2.0, 60.0
+"""Seconds between two looks at the workers, and without any until the log says so."""
+
+LOCAL: dict[str, Any] = {
+    "threads_per_worker": 1, "processes": True, "memory_limit": 0, "silence_logs": logging.CRITICAL,
+    "dashboard_address": ":0", "scheduler_kwargs": {"dashboard": False},
+}  # fmt: skip
+"""Of a cluster that is started here: an oracle need not bear threads, and no worker is ended for its memory."""
+
+
+class DaskCluster(Executor):
+    """A Dask cluster, joined or begun when the first point asks for it.
+
+    Parameters
+    ----------
+    recipe : Recipe
+    address : str or None
+        Of the scheduler, such as ``tcp://head:8786``, or the path of its file, which ends in ``.json``. With None a
+        cluster is started here.
+    workers : int
+        Of a cluster that is started here.
+    batch : int or None
+        Points per task; as many as the oracle answers together, if None.
+    note : callable
+        Told in a sentence what is worth a line in the log.
+    """
+
+    def __init__(
+        self, recipe: Recipe, address: str | None, workers: int, batch: int | None, note: Callable[[str], None]
+    ) -> None:
+        self.recipe, self.address, self.workers, self.batch, self.note = recipe, address, workers, batch, note
+        self._client: Any = None
+        self._cluster: Any = None
+        self._given: dict[Any, Batch] = {}
+        self._done: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._backlog = Backlog((), recipe.n_responses, note)
+        self._threads, self._looked, self._seen = 0, 0.0, 0.0
+        self._ahead = LEAST_AHEAD
+
+    def size(self, batch: int) -> int:
+        """As set, or as the oracle has it."""
+        return self.batch or batch
+
+    def run(self, batches: Iterable[Batch]) -> Iterator[Sequence[Answered]]:
+        """Keep the workers busy, those that join, too."""
+        self._backlog = Backlog(batches, self.recipe.n_responses, self.note)
+        while True:
+            self._fill()
+            found = self.arrived()
+            self._fill()  # before the answers are stored: workers are not to wait for the disk
+            if found:
+                yield found
+            elif not self._given:
+                return
+            else:
+                self._wait()
+
+    def arrived(self) -> Sequence[Answered]:
+        """Fetch what is done."""
+        from distributed.scheduler import KilledWorker
+
+        done = []
+        while True:
+            with suppress(queue.Empty):
+                done.append(self._done.get_nowait())
+                continue
+            break
+        failed = [future for future in done if future.status != "finished"]
+        for future in failed:
+            error = future.exception() if future.status == "error" else None
+            if isinstance(error, KilledWorker):
+                self._backlog.lost(self._given.pop(future), str(error.last_worker.address))
+            elif error is not None:
+                raise error
+            else:  # cancelled, or lost: so the client tells that its scheduler is gone
+                raise self._gone()
+        good = [future for future in done if future.status == "finished"]
+        return [*self._fetched(good), *self._backlog.given_up()]
+
+    def close(self, in_haste: bool) -> None:
+        """Leave the cluster as it was found, or end the one that was started."""
+        client, self._client = self._client, None
+        given, self._given = list(self._given), {}
+        if client is None:
+            return
+        with suppress(Exception):  # a scheduler that is gone cannot be told
+            if client.status == "running":
+                client.cancel(given)
+                client.unregister_worker_plugin(self.recipe.token)
+        with suppress(Exception):
+            client.close(timeout=worker.GRACE)
+        if self._cluster is not None:
+            with suppress(Exception):
+                self._cluster.close(timeout=worker.GRACE)
+
+    def _fetched(self, futures: list[Any]) -> list[Answered]:
+        if not futures:
+            return []
+        try:
+            results = self._client.gather(futures)
+        except FlexdoceError:
+            raise
+        except Exception as error:
+            raise self._gone() from error
+        found = [Answered(self._given.pop(f), *result) for f, result in zip(futures, results, strict=True)]
+        slowest = max(len(a.batch.rows) * a.seconds for a in found)
+        self._ahead = min(max(LEAST_AHEAD, round(HORIZON / max(slowest, 1e-6))), MOST_AHEAD)
+        return found
+
+    def _wait(self) -> None:
+        """Until something is done, or there is reason to look at the workers again."""
+        try:
+            first = self._done.get(timeout=LOOK_EVERY)
+        except queue.Empty:
+            if self._client.status != "running":
+                raise self._gone() from None
+        else:
+            self._done.put(first)
+
+    def _fill(self) -> None:
+        if not self._backlog:
+            return
+        client = self._client or self._open()
+        self._look()
+        while len(self._given) < self._ahead * max(self._threads, 1) and (batch := self._backlog.next()) is not None:
+            # pure: the cluster keeps no answers, the store does.
+            future = client.submit(worker.answer, self.recipe.token, batch.points, pure=False)
+            self._given[future] = batch
+            future.add_done_callback(self._done.put)
+
+    def _look(self) -> None:
+        """How many threads there are now."""
+        now = time.monotonic()
+        if now - self._looked < LOOK_EVERY:
+            return
+        self._looked = now
+        try:
+            self._threads = sum(self._client.nthreads().values())
+        except Exception as error:
+            raise self._gone() from error
+        if self._threads:
+            self._seen = now
+        elif now - self._seen > LONELY:
+            self._seen = now
+            self.note(f"the Dask scheduler {self._where} has no workers; waiting for some")
+
+    def _open(self) -> Any:
+        from distributed import Client, LocalCluster
+
+        _silence()
+        from .dask_worker import OraclePlugin
+
+        try:
+            if self.address is None:
+                with worker.uninterrupted():
+                    self._cluster = LocalCluster(n_workers=self.workers, **LOCAL)
+            is_file = self.address is not None and self.address.endswith(".json")
+            where: Any = {"scheduler_file" if is_file else "address": self._cluster or self.address}
+            self._client = Client(**where, timeout=PATIENCE, set_as_default=False)
+        except (OSError, ValueError) as error:
+            self.close(in_haste=True)
+            raise InputError(
+                f"executor.address: no Dask scheduler answers at {self._where} ({error}); start one with dask "
+                "scheduler, or leave the address out to have one started here"
+            ) from None
+        self._seen = time.monotonic()
+        self._client.register_plugin(OraclePlugin(self.recipe), name=self.recipe.token)
+        return self._client
+
+    @property
+    def _where(self) -> str:
+        return self.address or "on this machine"
+
+    def _gone(self) -> OSError:
+        return ConnectionError(
+            errno.ECONNRESET, "the Dask scheduler went away; what was answered is stored", f"executor {self._where}"
+        )
+
+
+def _silence() -> None:
+    """What matters is told by us, in one place; a traceback of a network would bury it."""
+    for name in logging.root.manager.loggerDict:
+        if name.split(".")[0] in {"distributed", "tornado"}:
+            logging.getLogger(name).setLevel(logging.CRITICAL)

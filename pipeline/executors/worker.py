@@ -1,0 +1,141 @@
+"""What runs in a worker process, wherever it is: it makes the oracle once, and answers."""
+
+import multiprocessing
+import os
+import signal
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from importlib import import_module
+from types import FrameType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.oracles import Answers, Oracle
+
+from ..errors import InputError
+from ..points import identity
+
+GRACE = 5.0
+"""Seconds that a worker has to end its programs after it was told to."""
+
+_ORACLES: dict[str, Oracle] = {}
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How a worker makes the oracle: plain data that goes to other processes and machines.
+
+    Parameters
+    ----------
+    token : str
+        Names the oracle among those of a worker, which may serve several studies.
+    make : callable
+        Gives the oracle; it can be pickled.
+    module : str
+        Of the oracle's class. Importing it registers what is registered there.
+    identity : str
+        What the oracle must be, as the store writes it.
+    n_responses : int
+    """
+
+    token: str
+    make: Callable[[], Oracle]
+    module: str
+    identity: str
+    n_responses: int
+
+
+def here() -> str:
+    """``host:pid`` of this process."""
+    return f"{socket.gethostname()}:{os.getpid()}"
+
+
+def prepare(recipe: Recipe) -> str:
+    """Make the oracle, if that was not done yet; gives who did.
+
+    Raises
+    ------
+    InputError
+        If it cannot be made here, or is not the one that the study has.
+    """
+    if recipe.token in _ORACLES:
+        return here()
+    with suppress(ImportError):
+        import_module(recipe.module)
+    try:
+        oracle = recipe.make()
+    except Exception as error:
+        raise InputError(f"worker {here()} cannot make the oracle: {error}") from None
+    if identity(oracle) != recipe.identity:
+        raise InputError(
+            f"worker {here()} has another version of the oracle {oracle.name!r} than this process; "
+            "install the same there as here"
+        )
+    _ORACLES[recipe.token] = oracle
+    return here()
+
+
+def answer(token: str, points: NDArray[np.float64]) -> tuple[Answers, float, str]:
+    """Answers at `points`, shape (n, n_factors); wall time per point [s]; who.
+
+    Raises
+    ------
+    InputError
+        If the oracle could not be made here.
+    """
+    if token not in _ORACLES:
+        raise InputError(f"worker {here()} has not got the oracle: look at its log, and install the same there as here")
+    began = time.monotonic()
+    try:
+        answers = _ORACLES[token].answer(points)
+    except SystemExit:
+        os._exit(1)  # told to end, and what ran for the point has ended; the pool would go on with the next one
+    return answers, (time.monotonic() - began) / len(points), here()
+
+
+def forget(token: str) -> None:
+    """The study is done, or given up: end what other threads still run for it."""
+    oracle = _ORACLES.pop(token, None)
+    if oracle is not None:
+        oracle.interrupt()
+
+
+def begin() -> None:
+    """In a new worker process of our own: Ctrl-C is the parent's to see to, and without a parent there is no work."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(signal, "pthread_sigmask"):  # blocked while it was started, see `uninterrupted`
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
+    # Raised where the work is, so that a program that runs for it is ended with it.
+    signal.signal(signal.SIGTERM, _leave)
+    threading.Thread(target=_follow_parent, daemon=True).start()
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    raise SystemExit(128 + number)
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Processes that are started within do not get Ctrl-C; here it comes afterwards."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _follow_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(GRACE)
+        os._exit(1)

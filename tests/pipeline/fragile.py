@@ -1,0 +1,68 @@
+"""An oracle for worker processes: it notes who was asked what, and ends its worker when it is told to."""
+
+import json
+import os
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from experiments import Factor, FactorSpace, Response, oracles
+from experiments.oracles import PointOracle
+from experiments.settings import parameter
+
+NOTES, KILL_ONCE, POISON, HOLD, SPOILT = "notes", "kill-once", "poison", "hold", "spoilt"
+"""Files of its folder: who was asked; the next one asked ends; large points end; nobody answers; it cannot be made."""
+
+
+@oracles.register
+@dataclass(frozen=True)
+class Fragile(PointOracle):
+    """Two polynomials of degree two in three factors."""
+
+    name: ClassVar[str] = "fragile"
+    resolution: ClassVar[float] = 1e-12
+    folder: str = parameter(".", "1", "where its files lie")
+    pause: float = parameter(0.0, "s", "how long an answer takes")
+
+    @property
+    def factors(self) -> FactorSpace:
+        return FactorSpace(tuple(Factor(name, "N", -1.0, 2.0) for name in "abc"))
+
+    @property
+    def responses(self) -> tuple[Response, ...]:
+        return Response("u", "m"), Response("v", "m")
+
+    def prepare(self) -> None:
+        if (Path(self.folder) / SPOILT).exists() and os.getpid() != int(os.environ["FRAGILE_PARENT"]):
+            raise ValueError("no licence on this machine")
+
+    def respond(self, point: np.ndarray) -> tuple[float, ...]:
+        folder = Path(self.folder)
+        with (folder / NOTES).open("a") as notes:
+            notes.write(json.dumps([os.getpid(), point.tolist()]) + "\n")
+        if is_fatal(folder, point):
+            os.kill(os.getpid(), signal.SIGKILL)
+        time.sleep(self.pause)
+        while (folder / HOLD).exists():
+            time.sleep(0.005)
+        a, b, c = point
+        return a + 0.1 * a * b, b - 0.05 * c**2
+
+
+def is_fatal(folder: Path, point: np.ndarray) -> bool:
+    """Whether this is the end of whoever was asked."""
+    try:
+        (folder / KILL_ONCE).unlink()
+    except FileNotFoundError:
+        return (folder / POISON).exists() and point[0] > 1.9
+    return True
+
+
+def asked(folder: Path) -> list[tuple[int, tuple[float, ...]]]:
+    """Who was asked what, in order."""
+    lines = (folder / NOTES).read_text().splitlines() if (folder / NOTES).exists() else []
+    return [(pid, tuple(point)) for pid, point in map(json.loads, lines)]
