@@ -8,7 +8,13 @@ from ..runner import Outcome
 from .views import number
 
 
-def screening_holes(outcome: Outcome) -> dict[str, Any] | None:
+def missing(outcome: Outcome) -> dict[str, Any]:
+    """By stage, what was done without the runs that failed: a table for the screening, a sentence for the others."""
+    said = {stage: outcome.gaps.get(stage, "").capitalize() for stage in ("fit", "validation", "inversion")}
+    return said | {"screening": _screening(outcome)}
+
+
+def _screening(outcome: Outcome) -> dict[str, Any] | None:
     """What the screening lost, one row per factor; None if no run of it failed."""
     found = outcome.screening.holes
     if found is None:
