@@ -56,7 +56,7 @@ class OracleTable(Table):
     name: str = Field(description="name of the oracle")
     parameters: dict[str, Setting] = Field(default={}, description="oracle inputs held fixed; defaults where not given")
     max_failed_fraction: float = Field(
-        default=0.0, ge=0.0, le=1.0, description="failed runs tolerated in the fit and the validation"
+        default=0.0, ge=0.0, le=1.0, description="share of the runs of a stage that may fail, screening included"
     )
     command: ProgramTable | None = Field(default=None, description="the program, for name = 'command'")
 

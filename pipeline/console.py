@@ -131,6 +131,7 @@ def summary(outcome: Outcome) -> None:
     console.print(table)
     if len(outcome.rounds) > 1:
         _rounds(outcome)
+    _gaps(outcome)
     _adequacy(outcome)
     _inverse(outcome)
     seconds = np.sum(list(outcome.seconds.values()))
@@ -164,6 +165,16 @@ def _rounds(outcome: Outcome) -> None:
         table.add_row(one.step, str(one.runs), str(one.degree), *errors)
     console.print(table)
     console.print(f"It ended there: {outcome.rounds[-1].then}.")
+
+
+def _gaps(outcome: Outcome) -> None:
+    """What was done without runs that failed."""
+    holes, unjudged = outcome.screening.holes, outcome.screening.unjudged
+    said = [("screening", sentence) for sentence in (holes.sentences() if holes else ())]
+    if holes and unjudged and not holes.blind:
+        said.append(("screening", f"kept because the missing runs leave open whether they act: {', '.join(unjudged)}"))
+    for stage, sentence in [*said, *outcome.gaps.items()]:
+        console.print(f"{stage.capitalize()}: {escape(sentence)}.", style="yellow", soft_wrap=True)
 
 
 def _adequacy(outcome: Outcome) -> None:

@@ -81,6 +81,14 @@ class Outcome:
         return stages.adequacy(self.study, self.screening)
 
     @property
+    def gaps(self) -> dict[str, str]:
+        """By stage after the screening, what was done without runs that failed; a stage without failures has none."""
+        runs = {"fit": self.fit_runs, "validation": self.validation_runs}
+        if self.round_trip is not None:
+            runs["inversion"] = self.round_trip.answers
+        return {stage: said for stage, one in runs.items() if (said := stages.gap(stage, one))}
+
+    @property
     def fit(self) -> FitTable:
         """How the model was fitted: as configured, or more widely where the fit grew."""
         fit, origin = self.study.config.fit, self.model.provenance
@@ -170,6 +178,8 @@ class _Runner:
                 screening_runs = self._executed("screening", folded)
                 screening = stages.screened(study, screening_runs)
             folder.write("screening/effects.csv", tables.effects_csv(screening))
+            for sentence in screening.holes.sentences() if screening.holes else ():
+                self.monitor.note(f"screening: {sentence}")
             kept = stages.kept_factors(study, screening)
         with self._timed("fill design"):
             fill = stages.fill_design(study, kept)
@@ -190,6 +200,8 @@ class _Runner:
             (*stages.shortfalls(study, model, grown.rounds), *differing), self.seconds, grown.rounds, commanded,
             exported,
         )  # fmt: skip
+        for stage, sentence in outcome.gaps.items():
+            self.monitor.note(f"{stage}: {sentence}")
         folder.write("provenance.json", provenance_json(started, datetime.now(UTC), self.seconds))
         with self._timed("report"):
             write_report(folder, outcome)

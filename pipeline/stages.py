@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import surrogates
 from experiments.designs import Design, Random, Uniform
 from experiments.runs import Runs
-from experiments.screening import Adequacy, NextDesign, Screening, screen
+from experiments.screening import Adequacy, NextDesign, Screening, TooManyHoles, screen
 from surrogates import Inversion, RoundTrip, Surrogate, Verdict, certify, commanding, errors, obstacle, round_trip
 from surrogates.candidates import BETTER
 from surrogates.links import NotPositive
@@ -27,10 +27,13 @@ INVERSE = "inverse"
 
 
 def screened(study: Study, runs: Runs) -> Screening:
-    """Who acts on what."""
-    if not runs.ok.all():
-        raise TooManyFailures(f"screening needs every run: {runs.failures()}; mend the oracle or the ranges, run again")
-    return screen(runs, study.config.screening.alpha, study.oracle.resolution)
+    """Who acts on what: by least squares if some runs failed, as far as the config tolerates and the design allows."""
+    tolerate(study, runs, "screening")
+    try:
+        return screen(runs, study.config.screening.alpha, study.oracle.resolution)
+    except TooManyHoles as error:
+        kinds = " ".join(f"--retry {kind}" for kind in sorted({runs.status[i - 1] for i in error.rerun}))
+        raise TooManyFailures(f"screening: {runs.failures()}; {error} (--retry-failed, or {kinds})") from None
 
 
 def adequacy(study: Study, screening: Screening) -> Adequacy:
@@ -47,11 +50,11 @@ def kept_factors(study: Study, screening: Screening) -> tuple[str, ...]:
     """Factors worth filling: those that act on some response, and those the config keeps.
 
     Where main effects are not the whole story, also those that may act behind them; all, if none can be
-    ruled out: dropping one would be a guess.
+    ruled out: dropping one would be a guess. So it would be where failed runs hide whether one acts.
     """
     found = adequacy(study, screening)
     acting = screening.active_factors if found.adequate else found.keep
-    wanted = {*acting, *study.config.screening.keep}
+    wanted = {*acting, *screening.unjudged, *study.config.screening.keep}
     if not wanted:
         raise InputError(
             "no response moves when the factors do: widen the ranges, look at the oracle, or name the factors "
@@ -226,6 +229,13 @@ def tolerate(study: Study, runs: Runs, stage: str) -> None:
         raise TooManyFailures(
             f"{stage}: {runs.failures()}; {failed:.1%} is more than oracle.max_failed_fraction = {allowed:g}"
         )
+
+
+def gap(stage: str, runs: Runs) -> str:
+    """What was done without the runs that failed, in a sentence; empty if none did."""
+    done = int(runs.ok.sum())
+    what = {"fit": "the model is fitted to", "validation": "errors are those at", "inversion": "errors are those at"}
+    return "" if done == len(runs) else f"{what[stage]} {done} of {len(runs)} runs, the others failed"
 
 
 def shortfalls(study: Study, surrogate: Surrogate, rounds: Sequence[Round] = ()) -> list[str]:

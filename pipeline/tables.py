@@ -38,8 +38,14 @@ def runs_csv(runs: Runs) -> str:
 
 
 def effects_csv(screening: Screening) -> str:
-    """One row per response and contrast."""
+    """One row per response and contrast; with failed runs, also the inflation that the margins must be widened by.
+
+    ``margin`` is that of the effect itself: ``me`` times the root of its ``inflation``.
+    """
     effects, rows = screening.effects, []
+    inflation = np.ones(len(effects.names))
+    if screening.holes:
+        inflation[: effects.n_factors] = screening.holes.inflation
     for j, (response, result) in enumerate(zip(effects.responses, screening.lenth, strict=True)):
         for i, name in enumerate(effects.names):
             rows.append(
@@ -57,6 +63,10 @@ def effects_csv(screening: Screening) -> str:
                     "noise_floor": result.noise_floor,
                 }
             )
+            if screening.holes:
+                vif = None if effects.is_dummy[i] else screening.holes.vif[i]
+                margin = result.me * np.sqrt(inflation[i])
+                rows[-1] |= {"inflation": inflation[i], "vif": vif, "margin": margin}
     return _csv(pd.DataFrame(rows))
 
 

@@ -7,6 +7,7 @@
 
 ==========================  ==========================================================================
 :mod:`.contrasts`           effects of all columns, centre points apart; :mod:`.aliasing` names them
+:mod:`.holes`               what failed runs cost, and which to run again; :mod:`.regression` does without them
 :mod:`.lenth`               Lenth's margins; :mod:`.dong`, :mod:`.zahn`, :mod:`.daniel` are alternatives
 :mod:`.critical`            simulated critical values of all of them
 :mod:`.box_meyer`           probability that a contrast acts; :mod:`.factor_posterior`, that a factor does
@@ -20,13 +21,14 @@
 from .adequacy import Adequacy, judge_adequacy
 from .aliasing import alias_matrix
 from .box_meyer import ContrastPosterior, box_meyer
-from .contrasts import Effects, contrast_columns, count_contrasts, effects
+from .contrasts import Effects, completed_values, contrast_columns, count_contrasts, effects
 from .critical import ReferenceDistribution, reference_distribution
 from .curvature import CentrePoints
 from .daniel import HalfNormalFit, half_normal_fit
 from .dong import dong
 from .evidence import AdequacyStatus, ResponseAdequacy
 from .factor_posterior import FactorPosterior, factor_posterior
+from .holes import Holes, TooManyHoles
 from .judgement import Judgement
 from .lenth import LenthResult, lenth
 from .next_design import NextDesign
@@ -42,14 +44,17 @@ __all__ = [
     "Effects",
     "FactorPosterior",
     "HalfNormalFit",
+    "Holes",
     "Judgement",
     "LenthResult",
     "NextDesign",
     "ReferenceDistribution",
     "ResponseAdequacy",
     "Screening",
+    "TooManyHoles",
     "alias_matrix",
     "box_meyer",
+    "completed_values",
     "contrast_columns",
     "count_contrasts",
     "dong",

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .aliasing import alias_matrix
 from .contrasts import Effects
 from .evidence import AdequacyStatus, ResponseAdequacy, look
 from .judgement import Judgement
@@ -86,7 +85,7 @@ def judge_adequacy(
     status = min((r.status for r in found), key=WORST_FIRST.index, default=AdequacyStatus.ADEQUATE)
     factors = effects.names[: effects.n_factors]
     active = {name for judgement in judgements for name in judgement.active_names}
-    clear = not np.abs(alias_matrix(effects.columns, effects.n_factors)[: effects.n_factors]).any()
+    clear = effects.clear
     keep = _kept(effects, found, judgements, heredity=clear and len(factors) > most_factors)
     bends = [r.curved for r in found if r.curved is not None]
     following, advice = choose(
@@ -103,6 +102,23 @@ def judge_adequacy(
     return Adequacy(status, found, reasons, following, keep, advice)
 
 
+def unjudged(effects: Effects, judgements: tuple[Judgement, ...]) -> tuple[str, ...]:
+    """Factors that do not act by a margin that holes have widened, and would act with this effect in the whole design.
+
+    All of them where nothing is left that measures the error. Dropping one would be a guess.
+    """
+    holes, factors = effects.holes, effects.names[: effects.n_factors]
+    if holes is None or holes.orthogonal:
+        return ()
+    if holes.blind:
+        return factors
+    found = set()
+    for j, judgement in enumerate(judgements):
+        large = np.abs(effects.values[: len(factors), j]) > judgement.me
+        found |= {i for i in np.flatnonzero(large & ~judgement.active[: len(factors)])}
+    return tuple(name for i, name in enumerate(factors) if i in found)
+
+
 def _kept(
     effects: Effects, found: tuple[ResponseAdequacy, ...], judgements: tuple[Judgement, ...], heredity: bool
 ) -> tuple[str, ...]:
@@ -115,8 +131,11 @@ def _kept(
     loud = {name for r in found for name in r.loud_dummies}
     # An unnamed column carries a little of every interaction, and so may a square that only the centre shows.
     unnamed = any(":" not in name for name in loud) and not heredity
+    # Nor does a column that stands in for others tell which of them is loud.
+    unnamed |= bool(loud) and effects.holes is not None and not effects.holes.orthogonal
     if unnamed or any(r.curved or r.status is AdequacyStatus.UNDECIDED for r in found):
         return factors
     wanted = {name for judgement in judgements for name in judgement.active_names}
+    wanted |= set(unjudged(effects, judgements))
     wanted |= {factor for name in loud if ":" in name for factor in name.split(":")}
     return tuple(name for name in factors if name in wanted)

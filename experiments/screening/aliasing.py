@@ -35,6 +35,24 @@ def alias_matrix(columns: NDArray[np.float64], n_factors: int) -> NDArray[np.flo
     return columns.T @ products / np.abs(columns[:, 0]).sum()
 
 
+def main_effect_aliases(factors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How much of each two-factor interaction each main effect carries by least squares, shape (n_factors, n_pairs).
+
+    Parameters
+    ----------
+    factors : ndarray, shape (n_runs, n_factors)
+        ±1, of full rank with a constant, but not orthogonal: runs are missing. Rows of zeros are left out.
+
+    Notes
+    -----
+    As :func:`alias_matrix`, where X₁'X₁ is not the identity: even a foldover is not clear without one of its runs.
+    """
+    here = factors[np.abs(factors).max(axis=1) > 0.0]
+    _, products = interaction_columns(here)
+    matrix = np.hstack([np.ones((len(here), 1)), here])
+    return np.asarray(np.linalg.lstsq(matrix, products, rcond=None)[0][1:], dtype=np.float64)
+
+
 def named_columns(
     columns: NDArray[np.float64], factors: tuple[str, ...], dummies: tuple[str, ...]
 ) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:

@@ -1,15 +1,17 @@
 """Effects from an orthogonal two-level design, one for every column it has."""
 
-from dataclasses import dataclass, field
 from itertools import chain, combinations, islice
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..designs.base import Design
-from ..runs import Response, Runs
+from ..runs import Runs
 from .aliasing import named_columns
 from .curvature import CentrePoints
+from .estimates import Effects
+from .incomplete import effects_with_holes
+from .regression import LeastSquares
 
 EXACT = 1e-12
 """How far a coded setting may be from -1, 0 or +1: physical units do not round-trip exactly."""
@@ -17,73 +19,32 @@ MOST_PRODUCTS = 5000
 """How many products of factors are tried as columns that a design does not name itself."""
 
 
-@dataclass(frozen=True, eq=False)
-class Effects:
-    """Effects of all columns of a two-level design, the unassigned (dummy) ones last.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Column names, length n_contrasts: the factors, then the dummies; a dummy that is a product of
-        factors has its name (``"A:B"``), the others are ``dummy1``, ``dummy2``, …
-    n_factors : int
-        How many of them are factors.
-    responses : tuple of Response
-        Length n_responses.
-    values : ndarray, shape (n_contrasts, n_responses)
-        Mean at high minus mean at low, in the response's SI unit: twice the coefficient.
-    magnitude : ndarray, shape (n_responses,)
-        Largest absolute response among the runs, the scale of rounding errors.
-    aliases : tuple of str
-        Length n_contrasts: the two-factor interactions that each column also measures in full, such as
-        ``"A:B - C:D"``; empty where there are none.
-    columns : ndarray, shape (n_runs, n_contrasts)
-        The contrasts: ±1, and rows of zeros at centre points.
-    spread : ndarray, shape (n_responses,)
-        Standard deviation over the two-level runs: the root of a quarter of all squared effects.
-    centre : CentrePoints or None
-        What the centre points say; None if there are none.
-    """
-
-    names: tuple[str, ...]
-    n_factors: int
-    responses: tuple[Response, ...]
-    values: NDArray[np.float64]
-    magnitude: NDArray[np.float64]
-    aliases: tuple[str, ...] = ()
-    columns: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))
-    spread: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
-    centre: CentrePoints | None = None
-
-    @property
-    def is_dummy(self) -> NDArray[np.bool_]:
-        """Which columns no factor was assigned to, shape (n_contrasts,)."""
-        return np.arange(len(self.names)) >= self.n_factors
-
-    @property
-    def n_runs(self) -> int:
-        """Number of two-level runs, the centre points left out."""
-        return int(np.count_nonzero(np.abs(self.columns).max(axis=1)))
-
-
 def effects(runs: Runs) -> Effects:
     """Effects of every column of the runs' design, and of the products of factors that it has room for.
 
-    Centre points (rows of zeros) are left out of the contrasts and kept for curvature.
+    Centre points (rows of zeros) are left out of the contrasts and kept for curvature. Where runs failed the main
+    effects are least squares on those left, and what is left of the dummy columns stands in for them.
 
     Raises
     ------
     ValueError
-        If a run failed, a column is not two-level and balanced, or two columns are not orthogonal:
-        contrasts would then mix effects.
+        If a column is not two-level and balanced, or two columns are not orthogonal: contrasts would then mix effects.
+    TooManyHoles
+        If the runs that did not fail are too few for main effects or for Lenth's method; a ValueError, too.
+
+    Notes
+    -----
+    Box (1990), "A simple way to deal with missing observations from designed experiments", Quality Engineering 3,
+    249–254, estimates the missing ones, which gives the same effects, and prefers regression where there is a
+    computer (from a summary). :func:`completed_values` shows what he would have put in.
     """
-    if not runs.ok.all():
-        raise ValueError(f"effects need every run of the design: {runs.failures()}")
     columns = contrast_columns(runs.design)
     factors = runs.design.space.names
     corner = np.abs(columns).max(axis=1) > 0.0
     more, labels = completing_columns(columns, factors)
     columns, names, aliases = named_columns(np.hstack([columns, more]), factors, runs.design.dummy_names + labels)
+    if not runs.ok.all():
+        return effects_with_holes(runs, columns, names, aliases)
     at_corners = runs.values[corner]
     return Effects(
         names,
@@ -96,6 +57,20 @@ def effects(runs: Runs) -> Effects:
         at_corners.std(axis=0),
         None if corner.all() else CentrePoints.compare(at_corners, runs.values[~corner]),
     )
+
+
+def completed_values(runs: Runs) -> NDArray[np.float64]:
+    """Answers, shape (n_runs, n_responses), with what the main effects predict where a run failed.
+
+    For plots: contrasts of the whole design over these are the least-squares effects (Yates's missing values).
+    """
+    if runs.ok.all():
+        return runs.values
+    found, design = effects(runs), runs.design
+    here = np.abs(found.columns).max(axis=1) > 0.0
+    matrix = np.hstack([np.ones((len(design), 1)), np.rint(design.coded)])
+    guess = matrix @ (LeastSquares.of(matrix[here]).inverse @ runs.values[here])
+    return np.where(runs.ok[:, None], runs.values, guess)
 
 
 def contrast_columns(design: Design) -> NDArray[np.float64]:

@@ -31,10 +31,15 @@ class CentrePoints:
         Box and Draper (1987), "Empirical Model-Building and Response Surfaces": the difference of
         the two means estimates β₁₁ + β₂₂ + …; squares of opposite sign can cancel in it.
         """
+        return cls.against(corners.mean(axis=0), centres)
+
+    @classmethod
+    def against(cls, mean: NDArray[np.float64], centres: NDArray[np.float64]) -> "CentrePoints":
+        """The same from the mean of the two-level runs, shape (n_responses,); by least squares if some failed."""
         n = len(centres)
         error = centres.std(axis=0, ddof=1) if n > 1 else np.full(centres.shape[1], np.nan)
-        return cls(n, corners.mean(axis=0) - centres.mean(axis=0), error)
+        return cls(n, mean - centres.mean(axis=0), error)
 
-    def standard_error(self, noise: float, n_corners: int) -> float:
+    def standard_error(self, noise: float, n_corners: float) -> float:
         """Standard error of the curvature where one run has standard deviation `noise`."""
         return noise * float(np.sqrt(1.0 / n_corners + 1.0 / self.n_runs))

@@ -106,6 +106,8 @@ def _aliased(effects: Effects, judgement: Judgement) -> str:
 def _hidden_share(effects: Effects, j: int) -> float:
     """Standard deviation that main effects leave over all of it: each effect c adds c²/4 to the variance."""
     total = float(effects.spread[j]) ** 2
+    if effects.holes is not None:
+        return float(effects.holes.left[j]) / float(effects.spread[j]) if total > 0.0 else 0.0
     explained = 0.25 * float((effects.values[: effects.n_factors, j] ** 2).sum())
     return float(np.sqrt(max(total - explained, 0.0) / total)) if total > 0.0 else 0.0
 
@@ -124,13 +126,13 @@ def _curvature(
     effects: Effects, j: int, judgement: Judgement, tolerance: float, rounding: float
 ) -> tuple[float, bool | None]:
     """Curvature over the standard deviation of the two-level runs, and whether it is more than noise."""
-    centre, spread, n = effects.centre, float(effects.spread[j]), effects.n_runs
+    centre, spread, n = effects.centre, float(effects.spread[j]), effects.mean_runs
     if centre is None:
         return float("nan"), None
     bend, repeated = float(centre.curvature[j]), float(centre.pure_error[j])
     share = bend / spread if spread > rounding else float(np.copysign(np.inf, bend) if abs(bend) > rounding else 0.0)
     # An effect's standard error is 2σ/√n, so one run's is √n/2 times that.
-    per_run = 0.5 * np.sqrt(n)
+    per_run = 0.5 * np.sqrt(effects.n_runs)
     if repeated > 0.0:
         limit = centre.standard_error(repeated, n) * float(stdtrit(centre.n_runs - 1, 1.0 - 0.5 * judgement.alpha))
     elif judgement.noise_floor > 0.0:

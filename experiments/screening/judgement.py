@@ -46,6 +46,8 @@ class Judgement:
         Whether half or more of the contrasts seem to act, so that the contrasts tell nothing about the error.
     p_values, simultaneous_p : ndarray, shape (m,)
         Probability of a contrast this large if nothing acts: for this one, and for the largest of all.
+    scaled : bool
+        Whether the contrasts of factors are effects over the root of their inflation, as runs are missing.
     """
 
     names: tuple[str, ...]
@@ -63,6 +65,7 @@ class Judgement:
     crowded: bool = False
     p_values: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     simultaneous_p: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    scaled: bool = False
 
     @property
     def active(self) -> NDArray[np.bool_]:

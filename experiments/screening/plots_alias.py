@@ -19,6 +19,8 @@ GRID = "#94a3b8"
 def alias_map(ax: "Axes", design: Design) -> "Axes":
     """How much of each two-factor interaction (across) every column (down) carries, from 0 to 1.
 
+    Of the whole design: runs that fail blur it, as ``Holes`` says.
+
     Raises
     ------
     ValueError

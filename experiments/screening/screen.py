@@ -1,14 +1,15 @@
 """The whole screening step: effects of every response, judged by Lenth's method."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..runs import Runs
-from .adequacy import Adequacy, judge_adequacy
+from .adequacy import Adequacy, judge_adequacy, unjudged
 from .contrasts import Effects, effects
 from .evidence import MARGIN_OF_FLOOR
+from .holes import Holes
 from .lenth import LenthResult, lenth
 from .noise import effect_error
 
@@ -22,7 +23,7 @@ class Screening:
     effects : Effects
         All contrasts, n_contrasts × n_responses.
     lenth : tuple of LenthResult
-        One per response.
+        One per response; where runs are lost, of the standardised contrasts.
     """
 
     effects: Effects
@@ -46,6 +47,16 @@ class Screening:
             raise ValueError(f"unknown response {response!r}; known are {', '.join(names)}")
         factors = set(self.effects.names[: self.effects.n_factors])
         return tuple(n for n in self.lenth[names.index(response)].active_names if n in factors)
+
+    @property
+    def holes(self) -> Holes | None:
+        """What failed runs cost; None if none failed."""
+        return self.effects.holes
+
+    @property
+    def unjudged(self) -> tuple[str, ...]:
+        """Factors that do not act only because runs are missing; see :func:`~.adequacy.unjudged`."""
+        return unjudged(self.effects, self.lenth)
 
     @property
     def undecided(self) -> tuple[str, ...]:
@@ -91,7 +102,8 @@ def screen(
     Parameters
     ----------
     runs : Runs
-        A complete orthogonal two-level design, with or without centre points.
+        An orthogonal two-level design, with or without centre points. Runs may have failed: main effects are then
+        least squares on the others, judged by their standard errors, and ``holes`` says what that costs.
     alpha : float
         Error rate of the margins.
     resolution : float
@@ -107,6 +119,14 @@ def screen(
     ------
     ValueError
         See :func:`effects` and :func:`lenth`; or if `noise` is not one number of 0 or more for each response.
+    TooManyHoles
+        If too many runs failed, or the wrong ones; it names those to run again.
+
+    Notes
+    -----
+    With holes, Lenth's method is given the effects over the root of their inflation and the contrasts that stand in
+    for the dummies (:func:`~.regression.error_columns`), all of variance 4σ²/n. The latter are uncorrelated with each
+    other and with the effects; the effects keep some correlation among themselves, which ``holes`` states.
     """
     found = effects(runs)
     floor = resolution * found.magnitude
@@ -115,8 +135,11 @@ def screen(
         if declared.shape != floor.shape or not (np.isfinite(declared).all() and (declared >= 0.0).all()):
             raise ValueError(f"noise needs a number of 0 or more for each of {len(floor)} responses, got {noise!r}")
         floor = np.maximum(floor, effect_error(declared, found.n_runs))
+    contrasts = found.standardised
     results = tuple(
-        lenth(found.values[:, j], found.names, alpha, float(floor[j]), critical=critical, dummies=found.is_dummy)
+        lenth(contrasts[:, j], found.names, alpha, float(floor[j]), critical=critical, dummies=found.is_dummy)
         for j in range(len(found.responses))
     )
+    if found.holes is not None and not found.holes.orthogonal:
+        results = tuple(replace(result, scaled=True) for result in results)
     return Screening(found, results)

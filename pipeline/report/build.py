@@ -9,7 +9,7 @@ from jinja2 import Environment, StrictUndefined
 from experiments.designs import METHODS
 
 from ..runner import Outcome
-from . import commanded, figures, growing, validation, views
+from . import commanded, figures, growing, holes, validation, views
 
 _HERE = files("pipeline.report")
 
@@ -49,6 +49,7 @@ def _content(outcome: Outcome, provenance: Mapping[str, Any]) -> dict[str, Any]:
         "kept": outcome.kept,
         "screening_title": METHODS[config.screening.design.method].title,
         "screening_runs": len(outcome.screening_runs),
+        "missing": holes.missing(outcome),
         "screening_figures": [figures.screening_figure(outcome, j) for j in n],
         "fill": views.fill(outcome),
         "design_figure": figures.design_figure(outcome),
