@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
 import tomli_w
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, WithJsonSchema
 
 from experiments.naming import suggestion
 from surrogates.candidates import HIGHEST
@@ -152,6 +152,24 @@ class ExportTable(Table):
     verify: bool = Field(default=True, description="run what was generated against the model, with the tools at hand")
 
 
+def flattened(table: Any) -> Any:
+    """``[sweep]`` with whole dotted keys, however they were written: values are lists, so that a table is none."""
+    if not isinstance(table, Mapping):
+        return table
+    found: dict[str, Any] = {}
+    for key, value in table.items():
+        below = flattened(value)
+        found |= {f"{key}.{k}": v for k, v in below.items()} if isinstance(below, dict) else {str(key): value}
+    return found
+
+
+SweepTable = Annotated[
+    dict[str, Annotated[list[Any], Field(min_length=1)]],
+    BeforeValidator(flattened),
+    WithJsonSchema({"type": "object", "additionalProperties": {"type": ["array", "object"]}}),
+]
+
+
 class Config(Table):
     """A study, as written by a person."""
 
@@ -167,6 +185,9 @@ class Config(Table):
     require: RequireTable = RequireTable()
     command: CommandTable = CommandTable()
     export: ExportTable = ExportTable()
+    sweep: SweepTable | None = Field(
+        default=None, description="lists of values by dotted key: the grid that flexdoce sweep runs"
+    )
 
 
 def load_config(path: str | Path, overrides: Sequence[str] = ()) -> Config:
@@ -233,9 +254,7 @@ def _apply(document: dict[str, Any], override: str) -> None:
     if not equals or not all(parts):
         raise InputError(f"--set {override!r} is not of the form dotted.key=value, such as fit.degree=3")
     try:
-        parsed = tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
-        parsed = value.strip()  # a word without quotes
+        parsed = written_value(value)
     except (ValueError, RecursionError) as error:
         raise InputError(f"--set {key}: {error}") from None
     table: Any = document
@@ -244,6 +263,20 @@ def _apply(document: dict[str, Any], override: str) -> None:
         if not isinstance(table, dict):
             raise InputError(f"--set {override!r}: {part!r} is a value, not a table")
     table[parts[-1]] = parsed
+
+
+def written_value(text: str) -> Any:
+    """A value as it is written on the command line: TOML, or a word without quotes.
+
+    Raises
+    ------
+    ValueError, RecursionError
+        If it is a number with too many digits, or nested too deep.
+    """
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text.strip()
 
 
 def _sentence(error: ValidationError) -> str:
@@ -296,8 +329,8 @@ def _model_in(hint: Any) -> Any:
 
 
 def differences(ours: Config, theirs: Config) -> list[str]:
-    """Dotted keys in which two configs differ."""
-    return sorted(_differ(ours.model_dump(), theirs.model_dump(), ""))
+    """Dotted keys in which two configs differ; their grids are no part of a study."""
+    return sorted(_differ(ours.model_dump(exclude={"sweep"}), theirs.model_dump(exclude={"sweep"}), ""))
 
 
 def _differ(a: Mapping[str, Any], b: Mapping[str, Any], prefix: str) -> set[str]:
