@@ -17,7 +17,7 @@ from surrogates.certificate import Certificate
 from .grid import Member, shown
 from .runner import Outcome
 
-OUTCOMES = {0: "ok", 1: "bug", 2: "refused", 3: "too many failures", 4: "requirement not met"}
+OUTCOMES = {0: "ok", 1: "bug", 2: "refused", 3: "too many failures", 4: "falls short"}
 """What became of a member, by the exit code that ``flexdoce run`` would have given it."""
 
 
@@ -67,6 +67,17 @@ class Found:
         """Largest error over its response's range, of all responses."""
         return max(e.max_relative for e in self.errors)
 
+    def error(self, response: str) -> float:
+        """Largest error of a response over its range; NaN where it is none of the model's."""
+        return next((e.max_relative for e in self.errors if e.response == response), float("nan"))
+
+    def slope(self, response: str, factor: str) -> float | None:
+        """One of the slopes by name; None where the model has no such response or factor."""
+        names = [r.name for r in self.responses]
+        if response not in names or factor not in self.factors.names:
+            return None
+        return float(self.slopes[names.index(response), self.factors.index(factor)])
+
     @property
     def verdict(self) -> str:
         """Of the certificate."""
@@ -94,7 +105,7 @@ class Found:
         scaled = self.slopes * self.factors.half_range
         if scaled.shape[0] != scaled.shape[1] or np.linalg.matrix_rank(_balanced(scaled)) < len(scaled):
             return None
-        return np.diag(np.linalg.inv(self.slopes))
+        return np.asarray(np.diag(np.linalg.inv(self.slopes)), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)

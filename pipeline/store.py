@@ -4,7 +4,7 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import ClassVar
+from typing import ClassVar, Self
 
 from experiments.oracles import Oracle
 from experiments.runs import Status
@@ -47,7 +47,7 @@ class RunFolder:
         self.path = path
         self.lock: FolderLock | None = None
 
-    def __enter__(self) -> "RunFolder":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
@@ -55,7 +55,7 @@ class RunFolder:
             self.lock.release()
 
     @classmethod
-    def claim(cls, path: Path, config: Config, fresh: bool = False) -> "RunFolder":
+    def claim(cls, path: Path, config: Config, fresh: bool = False) -> Self:
         """The folder for `config`: new, or continued if it holds the same config; emptied of our files if `fresh`.
 
         It is locked until the context that it is ends.
@@ -116,7 +116,7 @@ class RunFolder:
             self.write(self.config_name, dump_config(config))
 
     @classmethod
-    def existing(cls, path: Path) -> tuple["RunFolder", Config]:
+    def existing(cls, path: Path) -> tuple[Self, Config]:
         """A run folder that is there already, with its config; ``InputError`` if it is none."""
         if not (path / cls.config_name).is_file():
             raise InputError(f"{path} is not a {cls.kind}: it has no {cls.config_name}")

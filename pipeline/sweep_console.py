@@ -50,13 +50,15 @@ def sweep_summary(found: Sweep) -> None:
     """One row per member, and where everything is."""
     title = f"{found.config.name}: {len(found.rows)} members"
     table = Table(header_style="bold", title_justify="left", title=title, box=SIMPLE_HEAD, padding=(0, 1))
-    table.add_column("member", overflow="fold")
-    for heading in ("new runs", "largest error", "of", "certified box", "inverse", "outcome"):
-        is_text = heading in ("of", "inverse", "outcome")
-        table.add_column(heading, justify="left" if is_text else "right", no_wrap=not is_text)
+    longest = max(len(row.member.name) for row in found.rows)
+    table.add_column("member", overflow="fold", min_width=min(longest, 32))
+    for heading in ("new runs", "largest error", "box", "inverse", "outcome"):
+        is_text = heading in ("inverse", "outcome")
+        table.add_column(heading, justify="left" if is_text else "right", no_wrap=heading != "outcome")
     for row in found.rows:
-        table.add_row(escape(row.member.name), f"{row.new} of {row.runs}", *_results(row), row.outcome)
+        table.add_row(escape(row.member.name), str(row.new), *_results(row), row.outcome)
     console.print(table)
+    console.print("Box: side of the box on which the inverse is certified, over the ranges.", style="dim")
     asked = sum(row.asked for row in found.rows)
     console.print(f"The oracle was asked for {asked} runs this time; the rest was known or shared.")
     for what, name in {"Page": PAGE, "Table": TABLE}.items():
@@ -64,8 +66,5 @@ def sweep_summary(found: Sweep) -> None:
 
 
 def _results(row: Row) -> list[str]:
-    if row.found is None:
-        return ["–", "–", "–", "–"]
-    worst = max(row.found.errors, key=lambda e: e.max_relative)
-    symbol = next(r.symbol for r in row.found.responses if r.name == worst.response)
-    return [f"{100 * worst.max_relative:.2g} %", symbol, f"{100 * row.found.side:.3g} %", row.found.verdict]
+    found = row.found
+    return [f"{100 * found.worst:.2g} %", f"{100 * found.side:.3g} %", found.verdict] if found else ["–", "–", "–"]

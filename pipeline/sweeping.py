@@ -21,11 +21,13 @@ from .lock import Owner, holder
 from .runner import run
 from .status import read_status, stored
 from .store import CACHE, PAGE, TABLE, WORK, RunFolder, SweepFolder
-from .study import Study, ready, resolve
+from .study import STAGES, Study, ready, resolve
 from .tables import sweep_csv
 from .tally import Tally, Watcher
 
 SHORTFALL = 4
+MOST_NAMED = 5
+"""Members that the sentence at the end names."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,13 +85,13 @@ class Sweep:
 
     @property
     def trouble(self) -> str:
-        """Which members fell short and why, as one sentence; empty if none did."""
+        """Which members did not come to a good end, as one sentence; empty if all did."""
         bad = [row for row in self.rows if row.code]
         if not bad:
             return ""
-        told = "; ".join(f"{row.member.name}: {row.outcome} ({row.reason})" for row in bad[:3])
-        more = f"; and {len(bad) - 3} more" if len(bad) > 3 else ""
-        return f"{len(bad)} of {len(self.rows)} members fell short: {told}{more}; all are in {self.path / TABLE}"
+        named = ", ".join(f"{row.member.name} ({row.outcome})" for row in bad[:MOST_NAMED])
+        more = f" and {len(bad) - MOST_NAMED} more" if len(bad) > MOST_NAMED else ""
+        return f"{len(bad)} of {len(self.rows)} members: {named}{more}; {self.path / TABLE} says why"
 
 
 class Watch:
@@ -113,7 +115,7 @@ class _Asked:
         self.tally(Tally(stage, done, total))
 
     def tally(self, tally: Tally) -> None:
-        fresh = tally.done - tally.known if tally.total else 0
+        fresh = tally.done - tally.known if tally.stage in STAGES else 0
         # A stage that runs the oracle begins with what is known.
         self.total += fresh - self._last if fresh >= self._last else fresh
         self._last = fresh
