@@ -51,7 +51,7 @@ def sweep_summary(found: Sweep) -> None:
     title = f"{found.config.name}: {len(found.rows)} members"
     table = Table(header_style="bold", title_justify="left", title=title, box=SIMPLE_HEAD, padding=(0, 1))
     longest = max(len(row.member.name) for row in found.rows)
-    table.add_column("member", overflow="fold", min_width=min(longest, 32))
+    table.add_column("member", overflow="fold", min_width=min(longest, 22))
     for heading in ("new runs", "largest error", "box", "inverse", "outcome"):
         is_text = heading in ("inverse", "outcome")
         table.add_column(heading, justify="left" if is_text else "right", no_wrap=heading != "outcome")

@@ -22,7 +22,7 @@ from pipeline.cli import main
 from pipeline.comparison import ratio
 from pipeline.lock import FolderLock
 from surrogates import load
-from tests.pipeline.cases import contents, reproducible
+from tests.pipeline.cases import CONFIGS, contents, reproducible
 
 BAD = -1.0
 
@@ -379,3 +379,12 @@ class TestCommand:
         Spring.asked.clear()
         assert main(["sweep", str(tmp_path / "out" / "sweep.toml"), "--out", str(tmp_path / "out")]) == 0
         assert Spring.asked == []
+
+
+def test_every_example_with_a_grid_can_be_swept():
+    found = [path for path in sorted(CONFIGS.glob("*.toml")) if pipeline.load_config(path).sweep]
+    assert "hexflex_sweep" in {path.stem for path in found}
+    for path in found:
+        base, grid, chosen = pipeline.sweeping.planned(path)
+        assert len(chosen) == np.prod([len(axis.values) for axis in grid])
+        assert base.sweep
