@@ -41,6 +41,7 @@ def run(arguments: Namespace) -> int | None:
     """``flexdoce run``."""
     from .runner import run as run_study
 
+    _tell_of_sweep(arguments)
     retry = FAILURES if arguments.retry_failed else [Status(kind) for kind in arguments.retry]
     try:
         with ended_like_ctrl_c(), progress_bars() as progress:
@@ -50,7 +51,6 @@ def run(arguments: Namespace) -> int | None:
     except TooManyFailures as error:
         raise TooManyFailures(f"{error}; they are kept as answers: --retry-failed runs them again") from None
     summary(outcome)
-    _tell_of_sweep(arguments)
     if outcome.shortfalls:
         raise RequirementNotMet("required but not met: " + "; ".join(outcome.shortfalls))
     return None
