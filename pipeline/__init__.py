@@ -9,6 +9,7 @@ from .config import Config, load_config
 from .errors import FlexdoceError, InputError, RequirementNotMet, TooManyFailures
 from .runner import Outcome, read_run, run
 from .study import Study, resolve
+from .sweeping import Sweep, sweep
 from .version import __version__
 
 __all__ = [
@@ -18,10 +19,12 @@ __all__ = [
     "Outcome",
     "RequirementNotMet",
     "Study",
+    "Sweep",
     "TooManyFailures",
     "__version__",
     "load_config",
     "read_run",
     "resolve",
     "run",
+    "sweep",
 ]

@@ -65,11 +65,13 @@ def _parser() -> argparse.ArgumentParser:
             sub.add_argument("--out", metavar="DIR", help="run folder (default: runs/<name of the study>)")
             _add_survival(sub)
 
+    _add_sweep(verb)
+
     sub = verb("report", commands.report, "write report.html of a run folder again; runs nothing")
     sub.add_argument("folder", metavar="RUN_DIR")
 
-    sub = verb("status", commands.status, "say where a run is, from another terminal; changes nothing")
-    sub.add_argument("folder", metavar="RUN_DIR")
+    sub = verb("status", commands.status, "say where a run or a sweep is, from another terminal; changes nothing")
+    sub.add_argument("folder", metavar="DIR", help="run folder, or folder of a sweep")
     sub.add_argument("--watch", action="store_true", help="say it again every two seconds until the run ends")
 
     _add_tables(verb)
@@ -77,6 +79,20 @@ def _parser() -> argparse.ArgumentParser:
     _add_exports(verb)
     verb("list", commands.list_known, "list oracles, designs and export targets with their settings")
     return parser
+
+
+def _add_sweep(verb: Callable[[str, object, str], argparse.ArgumentParser]) -> None:
+    """The command of studies of studies."""
+    sub = verb("sweep", commands.sweep, "run a study for every member of a grid, or continue it, and compare them")
+    sub.add_argument("config", metavar="CONFIG", help="config file, TOML; its table [sweep] is the grid, or a part")
+    sub.add_argument("--over", action="append", default=[], metavar="KEY=A,B,C", dest="over",
+                     help="values of a setting, such as oracle.parameters.thickness=1e-3,2e-3; several make the full "
+                     "grid; ranges=0.5,1,2 scales the ranges of all factors; repeatable")  # fmt: skip
+    sub.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
+                     help="replace a setting in all members; repeatable")  # fmt: skip
+    sub.add_argument("--out", metavar="DIR", help="folder of the run folders (default: runs/<name of the study>-sweep)")
+    sub.add_argument("--dry-run", action="store_true", help="check every member and print the grid; touches nothing")
+    _add_survival(sub)
 
 
 def _add_survival(sub: argparse.ArgumentParser) -> None:

@@ -20,12 +20,16 @@ from . import exporting, tables
 from .config import assignments, dump_config, load_config
 from .console import console, design_table, print_findings, print_status, progress_bars, summary
 from .errors import InputError, RequirementNotMet, TooManyFailures
+from .grid import parse_over
 from .points import FAILURES
 from .reading import read_points
 from .signals import ended_like_ctrl_c
-from .status import read_status
-from .store import RunFolder
+from .status import Standing, read_status
+from .store import RunFolder, SweepFolder
 from .study import resolve
+from .sweep_console import Bars, print_plan, sweep_summary
+from .sweeping import Progressing, planned, read_sweep_status
+from .sweeping import sweep as run_sweep
 
 WATCH_EVERY = 2.0
 """Seconds between two looks of ``flexdoce status --watch``."""
@@ -37,6 +41,7 @@ def run(arguments: Namespace) -> int | None:
     """``flexdoce run``."""
     from .runner import run as run_study
 
+    _tell_of_sweep(arguments)
     retry = FAILURES if arguments.retry_failed else [Status(kind) for kind in arguments.retry]
     try:
         with ended_like_ctrl_c(), progress_bars() as progress:
@@ -51,10 +56,39 @@ def run(arguments: Namespace) -> int | None:
     return None
 
 
+def sweep(arguments: Namespace) -> int | None:
+    """``flexdoce sweep``."""
+    over = parse_over(arguments.over)
+    if arguments.dry_run:
+        print_plan(*planned(arguments.config, over, arguments.overrides)[1:])
+        return None
+    retry = FAILURES if arguments.retry_failed else [Status(kind) for kind in arguments.retry]
+    with ended_like_ctrl_c():
+        found = run_sweep(
+            arguments.config, over, arguments.out, arguments.overrides, arguments.fresh, arguments.cache, retry, Bars()
+        )
+    sweep_summary(found)
+    if found.trouble:
+        _warn(found.trouble)
+    return found.code
+
+
+def _tell_of_sweep(arguments: Namespace) -> None:
+    """One line where a config has a grid that this command leaves alone."""
+    if load_config(arguments.config, arguments.overrides).sweep:
+        console.print(
+            f"This is the base; [sweep] has a grid: flexdoce sweep {arguments.config}, with --dry-run to see it.",
+            markup=False, soft_wrap=True,
+        )  # fmt: skip
+
+
 def check(arguments: Namespace) -> None:
     """``flexdoce check``."""
-    study = resolve(load_config(arguments.config, arguments.overrides))
-    print(dump_config(study.config), end="")
+    config = load_config(arguments.config, arguments.overrides)
+    study = resolve(config)
+    if config.sweep:
+        planned(arguments.config, None, arguments.overrides)
+    print(dump_config(config), end="")
     openly: Any = getattr(study.oracle, "openly", None)
     if openly:  # a program: what would be run, as comments, so that the whole stays a config
         print("\n# Nothing was run. The first point of the screening:")
@@ -83,8 +117,8 @@ def plan(arguments: Namespace) -> None:
             f"takes validation runs of its own, up to {looks} times."
         )
     console.print(f"Validation: {n_validation} random runs; inversion: up to {n_validation} more.")
-    most = len(screening) + folded + most_fit + (looks + 1) * n_validation
-    console.print(f"At most {most} runs in all. Nothing was run.")
+    console.print(f"At most {stages.most_runs(study)} runs in all. Nothing was run.")
+    _tell_of_sweep(arguments)
 
 
 def report(arguments: Namespace) -> None:
@@ -97,16 +131,22 @@ def report(arguments: Namespace) -> None:
 
 def status(arguments: Namespace) -> None:
     """``flexdoce status``."""
-    folder, _ = RunFolder.existing(Path(arguments.folder))
-    found = read_status(folder)
+    path = Path(arguments.folder)
+    found = _standing(path)
     print_status(found)
     try:
         while arguments.watch and found.owner:
             time.sleep(WATCH_EVERY)
-            found = read_status(folder)
+            found = _standing(path)
             print_status(found, again=True)
     except KeyboardInterrupt:
         pass  # the watching ends, not the run
+
+
+def _standing(path: Path) -> Standing | Progressing:
+    if SweepFolder.is_at(path):
+        return read_sweep_status(path)
+    return read_status(RunFolder.existing(path)[0])
 
 
 def predict(arguments: Namespace) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
 import tomli_w
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, WithJsonSchema
 
 from experiments.naming import suggestion
 from surrogates.candidates import HIGHEST
@@ -175,6 +175,24 @@ class ExecutorTable(Table):
     )
 
 
+def flattened(table: Any) -> Any:
+    """``[sweep]`` with whole dotted keys, however they were written: values are lists, so that a table is none."""
+    if not isinstance(table, Mapping):
+        return table
+    found: dict[str, Any] = {}
+    for key, value in table.items():
+        below = flattened(value)
+        found |= {f"{key}.{k}": v for k, v in below.items()} if isinstance(below, dict) else {str(key): value}
+    return found
+
+
+SweepTable = Annotated[
+    dict[str, Annotated[list[Any], Field(min_length=1)]],
+    BeforeValidator(flattened),
+    WithJsonSchema({"type": "object", "additionalProperties": {"type": ["array", "object"]}}),
+]
+
+
 class Config(Table):
     """A study, as written by a person."""
 
@@ -191,11 +209,14 @@ class Config(Table):
     command: CommandTable = CommandTable()
     export: ExportTable = ExportTable()
     executor: ExecutorTable = ExecutorTable()
+    sweep: SweepTable | None = Field(
+        default=None, description="lists of values by dotted key: the grid that flexdoce sweep runs"
+    )
 
     @property
     def of_answers(self) -> "Config":
         """Without what changes no answer: two configs that agree in this belong to the same run folder."""
-        return self.model_copy(update={"executor": ExecutorTable()})
+        return self.model_copy(update={"executor": ExecutorTable(), "sweep": None})
 
 
 def load_config(path: str | Path, overrides: Sequence[str] = ()) -> Config:
@@ -262,9 +283,7 @@ def _apply(document: dict[str, Any], override: str) -> None:
     if not equals or not all(parts):
         raise InputError(f"--set {override!r} is not of the form dotted.key=value, such as fit.degree=3")
     try:
-        parsed = tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
-        parsed = value.strip()  # a word without quotes
+        parsed = written_value(value)
     except (ValueError, RecursionError) as error:
         raise InputError(f"--set {key}: {error}") from None
     table: Any = document
@@ -273,6 +292,20 @@ def _apply(document: dict[str, Any], override: str) -> None:
         if not isinstance(table, dict):
             raise InputError(f"--set {override!r}: {part!r} is a value, not a table")
     table[parts[-1]] = parsed
+
+
+def written_value(text: str) -> Any:
+    """A value as it is written on the command line: TOML, or a word without quotes.
+
+    Raises
+    ------
+    ValueError, RecursionError
+        If it is a number with too many digits, or nested too deep.
+    """
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text.strip()
 
 
 def _sentence(error: ValidationError) -> str:

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import Protocol
 
 import numpy as np
 from rich.box import SIMPLE_HEAD
@@ -17,7 +18,6 @@ from surrogates.exports.verification import Outcome as Verified
 
 from .executors import Progress as Told
 from .runner import Outcome
-from .status import Standing
 from .tally import Tally, failures
 
 console = Console(highlight=False)
@@ -85,7 +85,15 @@ class _Lines:
         self._last = now
 
 
-def print_status(found: Standing, again: bool = False) -> None:
+class Lined(Protocol):
+    """What says in lines where something is."""
+
+    def lines(self) -> list[str]:
+        """A line each."""
+        ...
+
+
+def print_status(found: Lined, again: bool = False) -> None:
     """Where a run is; `again` clears a terminal first, and puts a line between two texts elsewhere."""
     if again and console.is_terminal:
         console.clear()

@@ -176,13 +176,26 @@ def counts(path: Path) -> dict[str, tuple[int, str]]:
         If the file cannot be read.
     """
     try:
-        with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True, timeout=2.0)) as db:
+        with _read_only(path) as db:
             query = "SELECT status, COUNT(*), MAX(rowid) FROM points GROUP BY status"
             last = {status: (n, row) for status, n, row in db.execute(query)}
             reason = "SELECT reason FROM points WHERE rowid = ?"
             return {status: (n, db.execute(reason, (row,)).fetchone()[0]) for status, (n, row) in last.items()}
     except sqlite3.Error as error:
         raise InputError(f"cannot read the point store {path}: {error}") from None
+
+
+def keys(path: Path) -> frozenset[str]:
+    """Keys of all points, without writing anything; ``InputError`` if the file cannot be read."""
+    try:
+        with _read_only(path) as db:
+            return frozenset(key for (key,) in db.execute("SELECT key FROM points"))
+    except sqlite3.Error as error:
+        raise InputError(f"cannot read the point store {path}: {error}") from None
+
+
+def _read_only(path: Path) -> closing[sqlite3.Connection]:
+    return closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True, timeout=2.0))
 
 
 def code(error: sqlite3.Error) -> int:

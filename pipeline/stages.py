@@ -75,6 +75,21 @@ def fill_design(study: Study, kept: tuple[str, ...]) -> Design:
     return design.embed(study.space)
 
 
+def most_runs(study: Study) -> int:
+    """Runs that a study may ask for, stage by stage, if all factors act and every look is taken.
+
+    Raises
+    ------
+    InputError
+        If its filling design cannot be made for all factors.
+    """
+    screening, fit = study.folded_screening or study.screening_design, study.config.require.max_runs
+    if fit is None:
+        method: Any = study.fill_method(len(study.space))
+        fit = method.n_runs or len(fill_design(study, study.space.names))
+    return len(screening) + fit + (study.most_looks + 1) * study.config.validation.n_runs
+
+
 def grown_design(study: Study, kept: tuple[str, ...], before: Design, n_runs: int, number: int) -> Design:
     """`before` with runs added, which fill what it leaves empty, to `n_runs` in all; the first of them are its own.
 

@@ -46,7 +46,7 @@ class Standing:
 
     def lines(self) -> list[str]:
         """What a person wants to know, a line each."""
-        state, told = self.state, [self._headline()]
+        state, told = self.state, [self.headline]
         if state is not None and state.stage:
             told.append(f"Stage: {self._stage(state)}")
         if self.trouble:
@@ -64,7 +64,9 @@ class Standing:
             told.append(f"Log: {self.folder / LOG}")
         return told
 
-    def _headline(self) -> str:
+    @property
+    def headline(self) -> str:
+        """Which run it is, and whether it runs."""
         name, state = self.folder.name, self.state
         if self.owner:
             return f"{name}: running ({self.owner})"
@@ -105,3 +107,12 @@ def read_status(folder: RunFolder, clock: Callable[[], float] = time.time) -> St
         except InputError as error:
             trouble = str(error)
     return Standing(folder.path, clock(), state, owner, points, trouble)
+
+
+def stored(folder: Path) -> frozenset[str]:
+    """Keys of the points that a run folder holds; none where there is no store, or none that can be read."""
+    store = folder / POINTS
+    try:
+        return database.keys(store) if store.is_file() else frozenset()
+    except InputError:
+        return frozenset()

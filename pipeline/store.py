@@ -4,6 +4,7 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
+from typing import ClassVar, Self
 
 from experiments.oracles import Oracle
 from experiments.runs import Status
@@ -24,6 +25,9 @@ OURS = (
 LEFT_OVER = {LOCK, LOG, STATE, f"{STATE}.partial", f"{CONFIG}.partial"}
 """What a run leaves that was killed before its folder had a config."""
 
+SWEEP, TABLE, PAGE, CACHE = "sweep.toml", "sweep.csv", "sweep.html", "cache"
+"""What a sweep's folder holds beside its members."""
+
 
 class RunFolder:
     """A run folder that belongs to one config.
@@ -34,11 +38,16 @@ class RunFolder:
         Use :meth:`claim` or :meth:`existing` to get one.
     """
 
+    kind: ClassVar[str] = "run folder"
+    config_name: ClassVar[str] = CONFIG
+    ours: ClassVar[tuple[str, ...]] = OURS
+    left_over: ClassVar[frozenset[str]] = frozenset(LEFT_OVER)
+
     def __init__(self, path: Path) -> None:
         self.path = path
         self.lock: FolderLock | None = None
 
-    def __enter__(self) -> "RunFolder":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
@@ -46,7 +55,7 @@ class RunFolder:
             self.lock.release()
 
     @classmethod
-    def claim(cls, path: Path, config: Config, fresh: bool = False) -> "RunFolder":
+    def claim(cls, path: Path, config: Config, fresh: bool = False) -> Self:
         """The folder for `config`: new, or continued if it holds the same config; emptied of our files if `fresh`.
 
         It is locked until the context that it is ends.
@@ -72,16 +81,24 @@ class RunFolder:
             raise
         return folder
 
+    @classmethod
+    def check(cls, path: Path, config: Config, fresh: bool = False) -> None:
+        """Whether :meth:`claim` would give the folder, but for its lock; ``InputError`` if not. Touches nothing."""
+        try:
+            cls(path)._owner(config, fresh)
+        except OSError as error:
+            raise InputError(f"cannot use the output folder {path}: {error.strerror}") from None
+
     def _owner(self, config: Config, fresh: bool) -> Config | None:
         """The config that the folder belongs to, if it does; ``InputError`` if `config` cannot have it."""
         path = self.path
         if path.exists() and not path.is_dir():
             raise InputError(f"the output folder {path} is a file; name a folder with --out")
-        if not path.is_dir() or {p.name for p in path.iterdir()} <= LEFT_OVER:
+        if not path.is_dir() or {p.name for p in path.iterdir()} <= self.left_over:
             return None
-        if not (path / CONFIG).is_file():
-            raise InputError(f"the folder {path} is not empty and is no run folder; name another with --out")
-        owner = load_config(path / CONFIG)
+        if not (path / self.config_name).is_file():
+            raise InputError(f"the folder {path} is not empty and is no {self.kind}; name another with --out")
+        owner = load_config(path / self.config_name)
         keys = differences(owner, config)
         if keys and not fresh:
             raise InputError(
@@ -92,18 +109,18 @@ class RunFolder:
 
     def _take(self, config: Config, fresh: bool, owner: Config | None) -> None:
         if fresh:
-            for name in OURS:
+            for name in self.ours:
                 self.discard(name)
         if owner is None or differences(owner, config):
             # A config.toml that says the same stays as it is: somebody may have written it by hand.
-            self.write(CONFIG, dump_config(config))
+            self.write(self.config_name, dump_config(config))
 
     @classmethod
-    def existing(cls, path: Path) -> tuple["RunFolder", Config]:
+    def existing(cls, path: Path) -> tuple[Self, Config]:
         """A run folder that is there already, with its config; ``InputError`` if it is none."""
-        if not (path / CONFIG).is_file():
-            raise InputError(f"{path} is not a run folder: it has no {CONFIG}")
-        return cls(path), load_config(path / CONFIG)
+        if not (path / cls.config_name).is_file():
+            raise InputError(f"{path} is not a {cls.kind}: it has no {cls.config_name}")
+        return cls(path), load_config(path / cls.config_name)
 
     @property
     def taken_over(self) -> str:
@@ -175,3 +192,22 @@ class RunFolder:
             if shared is not None:
                 shared.close()
             raise
+
+
+class SweepFolder(RunFolder):
+    """The folder of a sweep: the config with its grid, a run folder for each member, and what compares them."""
+
+    kind = "sweep's folder"
+    config_name = SWEEP
+    ours = (TABLE, PAGE)
+    left_over = frozenset({LOCK, f"{SWEEP}.partial"})
+
+    @classmethod
+    def is_at(cls, path: Path) -> bool:
+        """Whether a sweep's folder lies there."""
+        return (path / cls.config_name).is_file()
+
+    def note(self, config: Config) -> None:
+        """Keep the grid of this time: another value added to a key makes no other sweep."""
+        if self.peek(SWEEP) != dump_config(config):
+            self.write(SWEEP, dump_config(config))

@@ -143,6 +143,7 @@ def resolve(config: Config) -> Study:
     InputError
         With one sentence that says which table is wrong, what came and what is allowed.
     """
+    config = config.model_copy(update={"sweep": None})  # a study is one of its members
     oracle = _oracle(config)
     _checked("oracle.parameters", oracle.prepare)
     space = _checked("factors", lambda: _space(config, oracle))

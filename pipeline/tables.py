@@ -163,5 +163,10 @@ def prediction_csv(model: Surrogate, points: NDArray[np.float64], level: float |
     return _csv(table)
 
 
+def sweep_csv(table: pd.DataFrame) -> str:
+    """The members of a sweep, a row each."""
+    return _csv(table)
+
+
 def _csv(table: pd.DataFrame) -> str:
     return table.to_csv(index=False, lineterminator="\n")

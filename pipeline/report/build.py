@@ -23,9 +23,13 @@ def report_html(outcome: Outcome, provenance: Mapping[str, Any]) -> str:
     provenance : mapping
         Content of ``provenance.json``.
     """
+    return rendered("template.html", _content(outcome, provenance))
+
+
+def rendered(template: str, content: Mapping[str, Any]) -> str:
+    """A template of this folder with its content; `style` is ours."""
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    template = environment.from_string(_read("template.html"))
-    return template.render(_content(outcome, provenance))
+    return environment.from_string(_read(template)).render({"style": _read("style.css"), **content})
 
 
 def _content(outcome: Outcome, provenance: Mapping[str, Any]) -> dict[str, Any]:
@@ -33,7 +37,6 @@ def _content(outcome: Outcome, provenance: Mapping[str, Any]) -> dict[str, Any]:
     cases = views.shapes(outcome)
     n = range(len(model.responses))
     return {
-        "style": _read("style.css"),
         "script": _read("viewer.js"),
         "config": config,
         "title": config.title or config.name,

@@ -41,7 +41,7 @@ def screening_figure(outcome: Outcome, response: int) -> str:
         pareto(middle, result, shown)
         lenth_plot(right, result, shown)
 
-    return _uri(draw, (9.6, 2.7))
+    return uri(draw, (9.6, 2.7))
 
 
 def validation_figure(outcome: Outcome, response: int) -> str:
@@ -52,14 +52,14 @@ def validation_figure(outcome: Outcome, response: int) -> str:
         parity(left, outcome.model, outcome.validation_runs, response)
         residuals(right, outcome.model, outcome.validation_runs, response)
 
-    return _uri(draw, (4.7, 2.2))
+    return uri(draw, (4.7, 2.2))
 
 
 def design_figure(outcome: Outcome) -> str:
     """Scatter of every pair of the factors that were filled; at most eight, so that it can be read."""
     shown = outcome.kept[:8]
     side = 0.72 * len(shown) + 0.4
-    return _uri(lambda figure: pairs(figure, outcome.fit_runs.design, shown), (side, side))
+    return uri(lambda figure: pairs(figure, outcome.fit_runs.design, shown), (side, side))
 
 
 def shape_figure(shape: Shape) -> str:
@@ -68,10 +68,11 @@ def shape_figure(shape: Shape) -> str:
     def draw(figure) -> None:
         draw_shape(figure.add_subplot(projection="3d"), shape)
 
-    return _uri(draw, (7.0, 4.4))
+    return uri(draw, (7.0, 4.4))
 
 
-def _uri(draw: Callable[..., object], size: tuple[float, float]) -> str:
+def uri(draw: Callable[..., object], size: tuple[float, float]) -> str:
+    """What `draw` puts into a figure of that size in inches, as a data URI."""
     from matplotlib.figure import Figure
 
     with matplotlib.rc_context(STYLE):
