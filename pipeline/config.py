@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
 import tomli_w
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, ValidationError
 
 from experiments.naming import suggestion
 from surrogates.candidates import HIGHEST
@@ -53,12 +53,17 @@ class FillDesign(DesignTable):
 class OracleTable(Table):
     """What answers the runs."""
 
-    name: str = Field(description="name of the oracle")
+    name: str = Field(description="name of the oracle, or path/to/file.py:name, relative to the config's folder")
     parameters: dict[str, Setting] = Field(default={}, description="oracle inputs held fixed; defaults where not given")
     max_failed_fraction: float = Field(
         default=0.0, ge=0.0, le=1.0, description="failed runs tolerated in the fit and the validation"
     )
     command: ProgramTable | None = Field(default=None, description="the program, for name = 'command'")
+
+
+def _named(given: Any) -> Any:
+    """``oracle = "name"`` for a table with that name alone."""
+    return {"name": given} if isinstance(given, str) else given
 
 
 class ScreeningTable(Table):
@@ -159,7 +164,7 @@ class Config(Table):
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", description="short name: letters, digits, underscores")
     title: str = Field(default="", description="one line for the report")
     seed: int = Field(default=0, ge=0, le=2**63 - 1, description="seed of everything random")
-    oracle: OracleTable
+    oracle: Annotated[OracleTable, BeforeValidator(_named, json_schema_input_type=OracleTable | str)]
     factors: dict[str, FactorRange] = Field(default={}, description="ranges that replace the oracle's defaults")
     screening: ScreeningTable = ScreeningTable()
     fit: FitTable = FitTable()
@@ -167,6 +172,13 @@ class Config(Table):
     require: RequireTable = RequireTable()
     command: CommandTable = CommandTable()
     export: ExportTable = ExportTable()
+
+    _home: Path | None = PrivateAttr(default=None)
+
+    @property
+    def home(self) -> Path | None:
+        """Folder of the file that it is from, below which its oracle may lie; None if it is from none."""
+        return self._home
 
 
 def load_config(path: str | Path, overrides: Sequence[str] = ()) -> Config:
@@ -183,6 +195,7 @@ def load_config(path: str | Path, overrides: Sequence[str] = ()) -> Config:
         reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
         raise InputError(f"cannot read the config {path}: {reason}") from None
     config = parse_config(text, str(path), overrides)
+    config._home = Path(path).parent
     if config.oracle.command is None:
         return config
     # With the texts of its templates a config says all that it needs, wherever it is copied to.
@@ -198,6 +211,8 @@ def parse_config(text: str, origin: str = "config", overrides: Sequence[str] = (
         raise InputError(f"{origin} is not valid TOML: it is nested too deep") from None
     except ValueError as error:
         raise InputError(f"{origin} is not valid TOML: {error}") from None
+    if overrides and "oracle" in document:
+        document["oracle"] = _named(document["oracle"])
     for override in overrides:
         _apply(document, override)
     try:

@@ -73,6 +73,7 @@ class PointStore:
                 oracle.parameters,
                 oracle.factors.labels,
                 [r.label for r in oracle.responses],
+                *([oracle.code] if oracle.code else []),
             ],
             sort_keys=True,
         )

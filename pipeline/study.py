@@ -13,7 +13,8 @@ from experiments import designs, oracles
 from experiments.designs import Design, DesignMethod, Halton, Random, Sobol, Uniform
 from experiments.designs.uniform import MOST_RUNS
 from experiments.factors import FactorSpace
-from experiments.oracles import Oracle
+from experiments.oracles import Oracle, asked
+from experiments.oracles.files import is_file
 from experiments.screening import count_contrasts
 from experiments.terms import Terms
 from surrogates import Surrogate, commanding, exports
@@ -23,6 +24,7 @@ from surrogates.stepwise import FULLEST
 
 from .config import Config, FitTable
 from .errors import InputError
+from .oracle_file import Code, code_of, recorded, unchanged
 
 T = TypeVar("T")
 
@@ -54,6 +56,8 @@ class Study:
         All factors of the oracle, with the config's ranges.
     screening_design : Design
     export_prefix : str
+    code : Code or None
+        The file that the oracle was loaded from, if it was.
     """
 
     config: Config
@@ -61,6 +65,7 @@ class Study:
     space: FactorSpace
     screening_design: Design
     export_prefix: str
+    code: Code | None = None
 
     def fill_method(self, n_factors: int) -> DesignMethod:
         """The filling design's method, sized for `n_factors` factors that act."""
@@ -134,16 +139,19 @@ class Study:
         return seed.spawn(number)[-1] if number else seed
 
 
-def resolve(config: Config) -> Study:
+def resolve(config: Config, oracle: Oracle | None = None) -> Study:
     """Find and check everything that `config` names; runs nothing and touches nothing.
+
+    An oracle in a file is loaded for it, unless `oracle` stands in for the config's.
 
     Raises
     ------
     InputError
         With one sentence that says which table is wrong, what came and what is allowed.
     """
-    oracle = _oracle(config)
-    _checked("oracle.parameters", oracle.prepare)
+    code = None if oracle else code_of(config)
+    oracle = oracle or _oracle(config, code)
+    _checked("oracle.parameters", lambda: asked(oracle, "prepare", oracle.prepare))
     space = _checked("factors", lambda: _space(config, oracle))
     screening = config.screening
     method = _checked("screening.design", lambda: designs.get(screening.design.method, screening.design.settings))
@@ -159,7 +167,7 @@ def resolve(config: Config) -> Study:
         )
     for name in screening.keep:
         _checked("screening.keep", lambda name=name: space.index(name))
-    study = Study(config, oracle, space, design, config.export.prefix or config.name)
+    study = Study(config, oracle, space, design, config.export.prefix or config.name, code)
     _checked("screening.follow", lambda: study.folded_screening)
     fit = config.fit
     _checked(
@@ -173,11 +181,30 @@ def resolve(config: Config) -> Study:
     return study
 
 
-def _oracle(config: Config) -> Oracle:
+def restored(config: Config, folder: Path, load: bool = False) -> Study:
+    """The study of a finished run in `folder`; an oracle in a file is run only if asked, and only if it is the same.
+
+    Raises
+    ------
+    InputError
+        As :func:`resolve`; and if what the run noted of the oracle is damaged, or its code is gone or has changed.
+    """
+    if not is_file(config.oracle.name):
+        return resolve(config)
+    if not load:
+        return resolve(config, recorded(folder))
+    unchanged(config, folder)
+    return resolve(config)
+
+
+def _oracle(config: Config, code: Code | None) -> Oracle:
     """The oracle of that name, with its parameters or, if it is a program, with its table."""
     table = config.oracle
     if table.command is None and table.name != "command":
-        return _checked("oracle", lambda: oracles.get(table.name, **table.parameters))
+        found = _checked("oracle", lambda: oracles.get(code.name if code else table.name, **table.parameters))
+        if code and found.code != code.code:
+            raise InputError(f"oracle: {code.path} changed while it was read; try again")
+        return found
     if table.command is None or table.name != "command":
         raise InputError(
             "oracle.name = 'command' and a table [oracle.command] belong together; see docs/command-oracle.md"
