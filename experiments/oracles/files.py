@@ -75,7 +75,8 @@ def load(name: str) -> type[Oracle]:
     what = f"{place.attribute!r} in {path.name}"
     cls = oracle_class(what, _found(module, path, place.attribute))
     if cls.__module__ != module.__name__:  # imported by the file: what is noted below belongs to this file alone
-        cls = type(cls)(cls.__name__, (cls,), {"__module__": module.__name__, "__doc__": cls.__doc__})
+        derive: Any = type(cls)
+        cls = derive(cls.__name__, (cls,), {"__module__": module.__name__, "__doc__": cls.__doc__})
         setattr(module, place.attribute, cls)
     cls.code, cls.origin = digest(content)[:DIGITS], f"{path}:{place.attribute}"
     return cls
@@ -86,8 +87,7 @@ def _module(path: Path, content: bytes) -> ModuleType:
     name = f"{_PREFIX}{digest(str(path).encode())[:8]}_{digest(content)[:DIGITS]}"
     if name in sys.modules:
         return sys.modules[name]
-    loader = _Exactly(name, str(path))  # type: ignore - a stub knows no arguments
-    loader.content = content
+    loader = _Exactly.of(name, path, content)
     spec: Any = spec_from_file_location(name, path, loader=loader)
     module = sys.modules[name] = module_from_spec(spec)
     try:
@@ -105,6 +105,12 @@ class _Exactly(SourceFileLoader):
     """Runs the bytes that were read and hashed: no second reading, and no bytecode of an older file."""
 
     content: bytes
+
+    @classmethod
+    def of(cls, name: str, path: Path, content: bytes) -> "_Exactly":
+        loader = cls(name, str(path))
+        loader.content = content
+        return loader
 
     def get_code(self, fullname: str) -> CodeType:
         return compile(self.content, self.path, "exec", dont_inherit=True)

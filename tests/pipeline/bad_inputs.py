@@ -149,7 +149,7 @@ BAD = [
     ),
     # Oracles.
     Bad("unknown oracle", 'name = "bad"\n[oracle]\nname = "cantilver"\n', r"'cantilver'; did you mean 'cantilever'\?"),
-    Bad("unknown oracle as a text", 'name = "bad"\noracle = "cantilver"\n', r"'cantilver'; did you mean 'cantilever'\?"),
+    Bad("unknown oracle as a text", 'name = "bad"\noracle = "cantilver"\n', r"did you mean 'cantilever'\?"),
     *(
         Bad(f"oracle file {name}", f"name = 'bad'\noracle = '{name}'\n", match)
         for name, match in (
