@@ -9,6 +9,7 @@ import tomli_w
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, ValidationError
 
 from experiments.naming import suggestion
+from experiments.oracles.files import is_file
 from surrogates.candidates import HIGHEST
 
 from .errors import InputError
@@ -177,7 +178,7 @@ class Config(Table):
 
     @property
     def home(self) -> Path | None:
-        """Folder of the file that it is from, below which its oracle may lie; None if it is from none."""
+        """Folder of the file that it is from, if its oracle lies in a file below that; else None."""
         return self._home
 
 
@@ -195,7 +196,8 @@ def load_config(path: str | Path, overrides: Sequence[str] = ()) -> Config:
         reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
         raise InputError(f"cannot read the config {path}: {reason}") from None
     config = parse_config(text, str(path), overrides)
-    config._home = Path(path).parent
+    if is_file(config.oracle.name):
+        config._home = Path(path).parent
     if config.oracle.command is None:
         return config
     # With the texts of its templates a config says all that it needs, wherever it is copied to.
