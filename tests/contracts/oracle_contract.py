@@ -47,6 +47,8 @@ class OracleContract:
         assert oracle.batch >= 1
 
     def test_passes_what_everybody_can_check(self, oracle):
+        if hasattr(oracle, "jacobian") and not isinstance(oracle, JaxOracle):
+            pytest.skip("its Jacobian would be compiled for this alone; it has tests of its own")
         runs = oracles.check_oracle(oracle)
         assert runs.ok.all()
 
