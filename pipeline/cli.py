@@ -5,9 +5,11 @@ import signal
 import sys
 from collections.abc import Callable, Sequence
 
+from experiments.oracles import OracleError
+
 from . import commands
 from .compilation import keep_compiled
-from .errors import FlexdoceError
+from .errors import FlexdoceError, InputError
 from .points import FAILURES
 from .version import __version__
 
@@ -26,6 +28,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except FlexdoceError as error:
         print(f"flexdoce: {error}", file=sys.stderr)
         return error.exit_code
+    except OracleError as error:
+        print(f"flexdoce: {InputError(str(error))}", file=sys.stderr)
+        return InputError.exit_code
     except BrokenPipeError:
         return 0
     except OSError as error:
@@ -61,6 +66,8 @@ def _parser() -> argparse.ArgumentParser:
         sub.add_argument("config", metavar="CONFIG", help="config file, TOML")
         sub.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
                          help="replace a setting, such as fit.degree=3; repeatable")  # fmt: skip
+        if name == "check":
+            sub.add_argument("--load", action="store_true", help="load an oracle in a file, too: this runs the file")
         if name == "run":
             sub.add_argument("--out", metavar="DIR", help="run folder (default: runs/<name of the study>)")
             _add_survival(sub)
@@ -69,6 +76,7 @@ def _parser() -> argparse.ArgumentParser:
 
     sub = verb("report", commands.report, "write report.html of a run folder again; runs nothing")
     sub.add_argument("folder", metavar="RUN_DIR")
+    sub.add_argument("--load", action="store_true", help="load an oracle in a file, to draw it: this runs the file")
 
     sub = verb("status", commands.status, "say where a run or a sweep is, from another terminal; changes nothing")
     sub.add_argument("folder", metavar="DIR", help="run folder, or folder of a sweep")

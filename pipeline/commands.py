@@ -3,24 +3,24 @@
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from experiments import designs, oracles, settings
+from experiments import designs
 from experiments.runs import Status
 from surrogates import Inversion, Surrogate, exports, load, obstacle
 from surrogates.domain import outside_sentence
 from surrogates.exports.verification import Finding, Outcome
 from surrogates.preimages import Preimages
 
-from . import exporting, tables
+from . import exporting, listing, tables
 from .config import assignments, dump_config, load_config
 from .console import console, design_table, print_findings, print_status, progress_bars, summary
 from .errors import InputError, RequirementNotMet, TooManyFailures
 from .grid import parse_over
+from .oracle_file import code_of, not_loaded
 from .points import FAILURES
 from .reading import read_points
 from .signals import ended_like_ctrl_c
@@ -85,10 +85,18 @@ def _tell_of_sweep(arguments: Namespace) -> None:
 def check(arguments: Namespace) -> None:
     """``flexdoce check``."""
     config = load_config(arguments.config, arguments.overrides)
+    code = code_of(config)
+    if code and not arguments.load:
+        print(dump_config(config), end="")
+        for line in not_loaded(code):
+            print(f"# {line}" if line else "")
+        return
     study = resolve(config)
     if config.sweep:
         planned(arguments.config, None, arguments.overrides)
     print(dump_config(config), end="")
+    if study.oracle.origin:
+        print(f"\n# The oracle is from {study.oracle.origin}")
     openly: Any = getattr(study.oracle, "openly", None)
     if openly:  # a program: what would be run, as comments, so that the whole stays a config
         print("\n# Nothing was run. The first point of the screening:")
@@ -126,7 +134,7 @@ def report(arguments: Namespace) -> None:
     from .runner import read_run, write_report
 
     folder, _ = RunFolder.existing(Path(arguments.folder))
-    print(write_report(folder, read_run(arguments.folder)))
+    print(write_report(folder, read_run(arguments.folder, arguments.load)))
 
 
 def status(arguments: Namespace) -> None:
@@ -214,7 +222,7 @@ def export(arguments: Namespace) -> None:
     """``flexdoce export``: without a model, the list of targets."""
     if arguments.model is None:
         console.print("[bold]flexdoce export MODEL.json --to NAME --out DIR[/bold], NAME one of these, or all:")
-        _print_known(exports.TARGETS)
+        listing.print_known(exports.TARGETS)
         return
     if arguments.to is None or arguments.out is None:
         raise InputError("an export needs --to NAME (flexdoce export lists the names) and --out DIR")
@@ -274,23 +282,12 @@ def _target(name: str) -> None:
 
 def list_known(arguments: Namespace) -> None:
     """``flexdoce list``."""
-    for title, known in (
-        ("oracles", {name: oracles.oracle_class(name) for name in (*oracles.names(), *oracles.CONFIGURED)}),
-        ("designs", designs.METHODS),
-        ("exports", exports.TARGETS),
-    ):
-        console.print(f"[bold]{title}[/bold]")
-        _print_known(known)
-    console.print("Factors and responses of an oracle: flexdoce plan with a config that names it.", style="dim")
-
-
-def _print_known(known: Mapping[str, Any]) -> None:
-    for name, cls in known.items():
-        console.print(f"  [cyan]{name}[/cyan]  {cls.summary}", soft_wrap=True)
-        for row in settings.describe(cls):
-            unit = f" {row['unit']}" if row["unit"] not in ("", "1") else ""
-            line = f"      {row['name']} = {row['default']}{unit}  {row['about']}"
-            console.print(line, style="dim", markup=False, soft_wrap=True)
+    listing.print_oracles()
+    for title, known in (("designs", designs.METHODS), ("exports", exports.TARGETS)):
+        console.print(f"\n[bold]{title}[/bold]")
+        listing.print_known(known)
+    listing.print_parsers()
+    console.print("\nFactors and responses of an oracle: flexdoce plan with a config that names it.", style="dim")
 
 
 def _model(path: str) -> Surrogate:

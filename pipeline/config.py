@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
 import tomli_w
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, WithJsonSchema
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, ValidationError, WithJsonSchema
 
 from experiments.naming import suggestion
+from experiments.oracles.files import is_file
 from surrogates.candidates import HIGHEST
 
 from .errors import InputError
@@ -53,12 +54,17 @@ class FillDesign(DesignTable):
 class OracleTable(Table):
     """What answers the runs."""
 
-    name: str = Field(description="name of the oracle")
+    name: str = Field(description="name of the oracle, or path/to/file.py:name, relative to the config's folder")
     parameters: dict[str, Setting] = Field(default={}, description="oracle inputs held fixed; defaults where not given")
     max_failed_fraction: float = Field(
         default=0.0, ge=0.0, le=1.0, description="share of the runs of a stage that may fail, screening included"
     )
     command: ProgramTable | None = Field(default=None, description="the program, for name = 'command'")
+
+
+def _named(given: Any) -> Any:
+    """``oracle = "name"`` for a table with that name alone."""
+    return {"name": given} if isinstance(given, str) else given
 
 
 class ScreeningTable(Table):
@@ -200,7 +206,7 @@ class Config(Table):
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", description="short name: letters, digits, underscores")
     title: str = Field(default="", description="one line for the report")
     seed: int = Field(default=0, ge=0, le=2**63 - 1, description="seed of everything random")
-    oracle: OracleTable
+    oracle: Annotated[OracleTable, BeforeValidator(_named, json_schema_input_type=OracleTable | str)]
     factors: dict[str, FactorRange] = Field(default={}, description="ranges that replace the oracle's defaults")
     screening: ScreeningTable = ScreeningTable()
     fit: FitTable = FitTable()
@@ -218,6 +224,13 @@ class Config(Table):
         """Without what changes no answer: two configs that agree in this belong to the same run folder."""
         return self.model_copy(update={"executor": ExecutorTable(), "sweep": None})
 
+    _home: Path | None = PrivateAttr(default=None)
+
+    @property
+    def home(self) -> Path | None:
+        """Folder of the file that it is from, if its oracle lies in a file below that; else None."""
+        return self._home
+
 
 def load_config(path: str | Path, overrides: Sequence[str] = ()) -> Config:
     """Read a config file and apply ``dotted.key=value`` overrides.
@@ -233,6 +246,8 @@ def load_config(path: str | Path, overrides: Sequence[str] = ()) -> Config:
         reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
         raise InputError(f"cannot read the config {path}: {reason}") from None
     config = parse_config(text, str(path), overrides)
+    if is_file(config.oracle.name):
+        config._home = Path(path).parent
     if config.oracle.command is None:
         return config
     # With the texts of its templates a config says all that it needs, wherever it is copied to.
@@ -248,6 +263,8 @@ def parse_config(text: str, origin: str = "config", overrides: Sequence[str] = (
         raise InputError(f"{origin} is not valid TOML: it is nested too deep") from None
     except ValueError as error:
         raise InputError(f"{origin} is not valid TOML: {error}") from None
+    if overrides and "oracle" in document:
+        document["oracle"] = _named(document["oracle"])
     for override in overrides:
         _apply(document, override)
     try:

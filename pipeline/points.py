@@ -42,9 +42,11 @@ class Evaluated(NamedTuple):
 
 
 def identity(oracle: Oracle) -> str:
-    """All that an answer depends on but the settings: the oracle's name, version, parameters, and labels, in order."""
-    labels = [r.label for r in oracle.responses]
-    return json.dumps([oracle.name, oracle.version, oracle.parameters, oracle.factors.labels, labels], sort_keys=True)
+    """All that an answer depends on but the settings: the oracle's name, version, parameters, labels, and its code."""
+    labels, code = [r.label for r in oracle.responses], [oracle.code] if oracle.code else []
+    return json.dumps(
+        [oracle.name, oracle.version, oracle.parameters, oracle.factors.labels, labels, *code], sort_keys=True
+    )
 
 
 class PointStore:

@@ -19,13 +19,14 @@ from .errors import FlexdoceError, InputError
 from .executors import Executor, Progress, execute, silent
 from .growth import Grown, grow, wider
 from .monitor import Monitor
+from .oracle_file import noted
 from .points import PointStore
 from .provenance import provenance_json, read_provenance
 from .reading import Table, read_runs
 from .rounds import Round, read_rounds, rounds_csv
 from .stages import Fitted
 from .store import WORK, RunFolder
-from .study import STAGES, Study, ready, resolve
+from .study import STAGES, Study, ready, resolve, restored
 
 ROUNDS = "fit/rounds.csv"
 
@@ -150,10 +151,10 @@ def run(
         folder,
         folder.points(study.oracle, shared, retry) as points,
         Monitor(folder, study.config.name, progress) as monitor,
-        executors.make(study.config, study.oracle, folder.path / WORK, monitor.note) as executor,
+        executors.make(study.config, study.oracle, monitor.note) as executor,
     ):
         points.warn = monitor.note
-        for sentence in filter(None, (folder.taken_over, points.strangers())):
+        for sentence in filter(None, (folder.taken_over, *noted(folder, study.oracle, study.code), points.strangers())):
             monitor.note(sentence)
         return _Runner(study, folder, points, monitor, executor).run()
 
@@ -302,16 +303,24 @@ class _Runner:
             self.monitor.step(stage, done=True)
 
 
-def read_run(path: str | Path) -> Outcome:
+def read_run(path: str | Path, load: bool = False) -> Outcome:
     """A finished run folder, read back for a report or a notebook; runs nothing.
+
+    Parameters
+    ----------
+    path : path
+    load : bool
+        Whether an oracle in a file is loaded, which runs that file. Without it the study has an oracle that tells what
+        the run noted of it, but cannot be asked or drawn. Others are there in any case.
 
     Raises
     ------
     InputError
-        If the folder is no run folder, or a file of it is missing or damaged.
+        If the folder is no run folder, a file of it is missing or damaged, or code that is to be loaded is gone or has
+        changed.
     """
     folder, config = RunFolder.existing(Path(path))
-    study = resolve(config)
+    study = restored(config, folder.path, load)
     model = _read_model(folder, study)
     is_inverted = not obstacle(model)
     runs = {stage: _read_stage(folder, study, stage) for stage in STAGES if stage != "inversion" or is_inverted}

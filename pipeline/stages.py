@@ -282,6 +282,7 @@ def provenance(study: Study, kept: tuple[str, ...]) -> dict[str, Any]:
         "study": config.name,
         "oracle": oracle.name,
         "oracle_version": oracle.version,
+        **({"oracle_code": oracle.code} if oracle.code else {}),
         "oracle_source": oracle.source,
         "oracle_parameters": oracle.parameters,
         "seed": config.seed,

@@ -20,7 +20,8 @@ WORK = "work"
 """Where a program that is run as an oracle works, a folder a point."""
 OURS = (
     "provenance.json", POINTS, f"{POINTS}-journal", f"{POINTS}-wal", f"{POINTS}-shm", "model.json", "report.html",
-    "command.json", STATE, LOG, "screening", "fit", "validation", "inversion", "exports", WORK,
+    "command.json", "oracle.json", "oracle.py", STATE, LOG, "screening", "fit", "validation", "inversion", "exports",
+    WORK,
 )  # fmt: skip
 LEFT_OVER = {LOCK, LOG, STATE, f"{STATE}.partial", f"{CONFIG}.partial"}
 """What a run leaves that was killed before its folder had a config."""

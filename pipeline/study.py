@@ -14,7 +14,8 @@ from experiments import designs, oracles
 from experiments.designs import Design, DesignMethod, Halton, Random, Sobol, Uniform
 from experiments.designs.uniform import MOST_RUNS
 from experiments.factors import FactorSpace
-from experiments.oracles import Oracle
+from experiments.oracles import Oracle, asked
+from experiments.oracles.files import is_file
 from experiments.screening import count_contrasts
 from experiments.terms import Terms
 from surrogates import Surrogate, commanding, exports
@@ -24,6 +25,7 @@ from surrogates.stepwise import FULLEST
 
 from .config import Config, FitTable
 from .errors import InputError
+from .oracle_file import Code, code_of, recorded, unchanged
 
 T = TypeVar("T")
 
@@ -55,6 +57,8 @@ class Study:
         All factors of the oracle, with the config's ranges.
     screening_design : Design
     export_prefix : str
+    code : Code or None
+        The file that the oracle was loaded from, if it was.
     """
 
     config: Config
@@ -62,6 +66,7 @@ class Study:
     space: FactorSpace
     screening_design: Design
     export_prefix: str
+    code: Code | None = None
 
     def fill_method(self, n_factors: int) -> DesignMethod:
         """The filling design's method, sized for `n_factors` factors that act."""
@@ -135,8 +140,10 @@ class Study:
         return seed.spawn(number)[-1] if number else seed
 
 
-def resolve(config: Config) -> Study:
+def resolve(config: Config, oracle: Oracle | None = None) -> Study:
     """Find and check everything that `config` names; runs nothing and touches nothing.
+
+    An oracle in a file is loaded for it, unless `oracle` stands in for the config's.
 
     Raises
     ------
@@ -144,8 +151,9 @@ def resolve(config: Config) -> Study:
         With one sentence that says which table is wrong, what came and what is allowed.
     """
     config = config.model_copy(update={"sweep": None})  # a study is one of its members
-    oracle = _oracle(config)
-    _checked("oracle.parameters", oracle.prepare)
+    code = None if oracle else code_of(config)
+    oracle = oracle or _oracle(config, code)
+    _checked("oracle.parameters", lambda: asked(oracle, "prepare", oracle.prepare))
     space = _checked("factors", lambda: _space(config, oracle))
     screening = config.screening
     method = _checked("screening.design", lambda: designs.get(screening.design.method, screening.design.settings))
@@ -161,7 +169,7 @@ def resolve(config: Config) -> Study:
         )
     for name in screening.keep:
         _checked("screening.keep", lambda name=name: space.index(name))
-    study = Study(config, oracle, space, design, config.export.prefix or config.name)
+    study = Study(config, oracle, space, design, config.export.prefix or config.name, code)
     _checked("screening.follow", lambda: study.folded_screening)
     fit = config.fit
     _checked(
@@ -172,15 +180,34 @@ def resolve(config: Config) -> Study:
     _check_growth(study)
     _check_exports(study)
     _check_command(study)
-    _check_executor(config)
+    _check_executor(study)
     return study
 
 
-def _oracle(config: Config) -> Oracle:
+def restored(config: Config, folder: Path, load: bool = False) -> Study:
+    """The study of a finished run in `folder`; an oracle in a file is run only if asked, and only if it is the same.
+
+    Raises
+    ------
+    InputError
+        As :func:`resolve`; and if what the run noted of the oracle is damaged, or its code is gone or has changed.
+    """
+    if not is_file(config.oracle.name):
+        return resolve(config)
+    if not load:
+        return resolve(config, recorded(folder))
+    unchanged(config, folder)
+    return resolve(config)
+
+
+def _oracle(config: Config, code: Code | None) -> Oracle:
     """The oracle of that name, with its parameters or, if it is a program, with its table."""
     table = config.oracle
     if table.command is None and table.name != "command":
-        return _checked("oracle", lambda: oracles.get(table.name, **table.parameters))
+        found = _checked("oracle", lambda: oracles.get(code.name if code else table.name, **table.parameters))
+        if code and found.code != code.code:
+            raise InputError(f"oracle: {code.path} changed while it was read; try again")
+        return found
     if table.command is None or table.name != "command":
         raise InputError(
             "oracle.name = 'command' and a table [oracle.command] belong together; see docs/command-oracle.md"
@@ -189,13 +216,6 @@ def _oracle(config: Config) -> Oracle:
         raise InputError("oracle.parameters: a program has none; write what it needs into argv or a template")
     settings = table.command.settings
     return _checked("oracle.command", lambda: oracles.get("command", **settings))
-
-
-def made_oracle(config: Config, place: Path) -> Oracle:
-    """A study's oracle made anew, as :func:`ready` has it, in another process."""
-    oracle: Any = _oracle(config)
-    oracle.prepare()
-    return oracle.working_in(place) if hasattr(oracle, "working_in") else oracle
 
 
 def ready(study: Study, place: Path) -> Study:
@@ -330,9 +350,9 @@ def _check_exports(study: Study) -> None:
         _checked("export.prefix", lambda target=target: target.render(blank, study.export_prefix))
 
 
-def _check_executor(config: Config) -> None:
-    """Refuse settings of an executor that do not go together, and one that is not installed."""
-    table = config.executor
+def _check_executor(study: Study) -> None:
+    """Refuse settings of an executor that do not go together, what is not installed, and what no worker can make."""
+    table = study.config.executor
     if table.address is not None and table.name != "dask":
         raise InputError(f"executor.address belongs to executor.name = 'dask', not {table.name!r}")
     if table.address is not None and table.workers is not None:
@@ -341,6 +361,8 @@ def _check_executor(config: Config) -> None:
         raise InputError("executor.workers and executor.batch belong to executor.name = 'processes' or 'dask'")
     if table.name == "dask" and find_spec("distributed") is None:
         raise InputError("executor.name = 'dask' needs the package distributed; install flexdoce[dask]")
+    if table.name != "in_process":
+        _checked("executor", lambda: oracles.recipe(study.oracle))
 
 
 def _checked(where: str, make: Callable[[], T]) -> T:

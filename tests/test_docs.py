@@ -1,12 +1,14 @@
 """What the documents show is run: configs resolve, code blocks execute."""
 
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
 
 import pipeline
 from experiments import oracles
+from pipeline.cli import main
 from pipeline.config import parse_config
 
 ROOT = Path(__file__).parents[1]
@@ -50,15 +52,54 @@ def test_readme_test_command_is_what_ci_runs():
     assert "make test" in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
 
 
-def test_add_an_oracle_page_runs(registry, tmp_path):
-    names = {}
-    for code in blocks("docs/add-an-oracle.md", "python"):
-        exec(compile(code, "docs/add-an-oracle.md", "exec"), names)
-    config = tmp_path / "spring.toml"
-    config.write_text('name = "spring"\nvalidation.n_runs = 20\n[oracle]\nname = "spring"\n', encoding="utf-8")
-    outcome = pipeline.run(config, tmp_path / "run", ["fit.design.budget=200"])
+@pytest.fixture
+def oracle_page(registry, tmp_path, monkeypatch):
+    """The files of the page on oracles, in a folder that is the current one; gives its blocks of Python."""
+    for language, name in (("python", "spring.py"), ("toml", "spring.toml")):
+        (text,) = [code for code in blocks("docs/add-an-oracle.md", language) if code.startswith(f"# {name}\n")]
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    return blocks("docs/add-an-oracle.md", "python")
+
+
+def test_add_an_oracle_page_runs(oracle_page, tmp_path):
+    """The file and the config as they stand there, by the command line; a spring is no polynomial, but nearly one."""
+    assert (
+        len((tmp_path / "spring.py").read_text().splitlines() + (tmp_path / "spring.toml").read_text().splitlines())
+        < 30
+    )
+    assert main(["check", "spring.toml"]) == main(["check", "spring.toml", "--load"]) == 0
+    few = [f"--set={key}" for key in ("validation.n_runs=20", "fit.design.budget=200", "export.targets=[]")]
+    assert main(["run", "spring.toml", *few]) == 0
+    outcome = pipeline.read_run("runs/spring")
     assert outcome.kept == ("force", "stiffness")
+    assert outcome.study.oracle.parameters == {"preload": 0.1}
     assert max(e.max_relative for e in outcome.model.validation) < 0.01
+    force, stiffness = outcome.fit_runs.design.physical.T
+    assert (outcome.fit_runs.values[:, 0] == (force - 0.1) / stiffness).all()
+
+
+def test_every_other_block_of_that_page_runs(oracle_page, capsys):
+    names = {}
+    for code in oracle_page:
+        exec(compile(code, "docs/add-an-oracle.md", "exec"), names)
+    assert capsys.readouterr().out.count("\n") == 5, "the centre and four corners"
+    assert len(oracle_page) == 4
+
+
+def test_the_package_of_that_page_is_found(oracle_page, tmp_path, monkeypatch):
+    (text,) = [code for code in blocks("docs/add-an-oracle.md", "toml") if code.startswith("# pyproject.toml\n")]
+    ((group, entries),) = tomllib.loads(text)["project"]["entry-points"].items()
+    info, package = tmp_path / "springs-1.0.dist-info", tmp_path / "springs"
+    info.mkdir()
+    package.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: springs\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[{group}]\n" + "".join(f"{k} = {v}\n" for k, v in entries.items()))
+    (package / "__init__.py").write_text("")
+    (tmp_path / "spring.py").rename(package / "oracles.py")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    config = parse_config('name = "spring"\noracle = "spring"\n')
+    assert pipeline.resolve(config).oracle.origin == "springs 1.0, springs.oracles:spring"
 
 
 def test_nonlinear_beams_page_runs():

@@ -1,10 +1,10 @@
 """What answers a run: the oracle protocol and two ways to write one."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, is_dataclass
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,8 +13,13 @@ from ..designs.base import Design
 from ..factors import FactorSpace
 from ..runs import Response, Runs, Status
 
+T = TypeVar("T")
+
 CHUNK = 256
 """Points per compiled batch. Fixed, so that one shape is compiled and a point's answer never depends on its batch."""
+
+LONGEST_REASON = 300
+"""Characters of what somebody's own code raised."""
 
 
 class Answers(NamedTuple):
@@ -88,6 +93,10 @@ class Shape:
     anchors: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
 
 
+class OracleError(ValueError):
+    """Somebody's own oracle raised what it should not have, or gave what it should not have given: one sentence."""
+
+
 class Oracle(ABC):
     """Answers a batch of points with a batch of responses and a status each.
 
@@ -104,6 +113,9 @@ class Oracle(ABC):
         Points that are answered, and then stored, together.
     resolution : float
         Relative: differences below this fraction of a response's largest value are rounding.
+    origin, code : str
+        File or distribution that it was found in, and the first digits of the SHA-256 of that file; set by who finds
+        it, empty for what is built in or registered.
     """
 
     name: ClassVar[str]
@@ -112,6 +124,8 @@ class Oracle(ABC):
     version: ClassVar[str] = "1"
     batch: ClassVar[int] = 1
     resolution: ClassVar[float] = 0.0
+    origin: ClassVar[str] = ""
+    code: ClassVar[str] = ""
 
     @property
     @abstractmethod
@@ -162,6 +176,8 @@ class Oracle(ABC):
         ------
         ValueError
             If the design's factors are not this oracle's, in name, unit and order.
+        OracleError
+            If an oracle of somebody's own raises instead of answering, or its answers have another shape.
         """
         if design.space.labels != self.factors.labels:
             raise ValueError(
@@ -172,17 +188,51 @@ class Oracle(ABC):
         return Runs(design, self.responses, values, tuple(status), tuple(reasons))
 
     def answer(self, points: NDArray[np.float64]) -> Answers:
-        """Answer points in physical units, shape (n, n_factors); what is not finite has failed."""
-        values, status, reasons = self.evaluate(points)
-        values = np.array(values, dtype=np.float64)
+        """Answer points in physical units, shape (n, n_factors); what is not finite has failed.
+
+        Raises
+        ------
+        OracleError
+            If an oracle of somebody's own raises instead of answering, or its answers have another shape.
+        """
+        return asked(self, "evaluate", lambda: self._complete(points))
+
+    def _complete(self, points: NDArray[np.float64]) -> Answers:
+        found, status, reasons = self.evaluate(points)
+        values, expected = np.array(found, dtype=np.float64), (len(points), len(self.responses))
+        if values.shape != expected:
+            raise ValueError(f"values must have shape {expected} (points, responses); got {values.shape}")
+        if not len(status) == len(reasons) == len(points):
+            raise ValueError(f"need one status and one reason for each of {len(points)} points")
         for i in np.flatnonzero(~np.isfinite(values).all(axis=1)):
             if status[i] is Status.OK:
                 bad = [r.name for r, v in zip(self.responses, values[i], strict=True) if not np.isfinite(v)]
                 status[i], reasons[i] = Status.NON_FINITE, f"{', '.join(bad)} not finite"
+        values[[s is not Status.OK for s in status]] = np.nan
         return Answers(values, status, reasons)
 
     def interrupt(self) -> None:  # noqa: B027 - what runs in this process ends with it
         """End what other threads run for this oracle outside of this process."""
+
+
+def asked(oracle: Oracle, what: str, call: Callable[[], T]) -> T:
+    """What `call` gives; whatever an oracle of somebody's own raises becomes an :class:`OracleError`.
+
+    What a built-in one raises is a bug of ours and stays as it is.
+    """
+    try:
+        return call()
+    except Exception as error:
+        if not oracle.origin or isinstance(error, OracleError):
+            raise
+        raise OracleError(f"oracle {oracle.name!r} ({oracle.origin}): {what} raised {told(error)}") from error
+
+
+def told(error: BaseException) -> str:
+    """An exception in one line: its kind and the first line of what it says."""
+    said = next((line.strip() for line in str(error).splitlines() if line.strip()), "")
+    said = said if len(said) <= LONGEST_REASON else said[: LONGEST_REASON - 1] + "…"
+    return f"{type(error).__name__}: {said}" if said else type(error).__name__
 
 
 class PointOracle(Oracle):

@@ -1,15 +1,13 @@
 """Which executor a config asks for."""
 
 from collections.abc import Callable
-from functools import partial
-from pathlib import Path
 from uuid import uuid4
 
+from experiments import oracles
 from experiments.oracles import Oracle
 
 from ..config import Config
 from ..points import identity
-from ..study import made_oracle
 from .base import Executor, cores
 from .dask_cluster import DaskCluster
 from .in_process import InProcess
@@ -17,7 +15,7 @@ from .processes import Processes
 from .worker import Recipe
 
 
-def make(config: Config, oracle: Oracle, work: Path, note: Callable[[str], None]) -> Executor:
+def make(config: Config, oracle: Oracle, note: Callable[[str], None]) -> Executor:
     """The executor of a study; nothing is started before the first point.
 
     Parameters
@@ -25,21 +23,18 @@ def make(config: Config, oracle: Oracle, work: Path, note: Callable[[str], None]
     config : Config
     oracle : Oracle
         That of the study, in this process.
-    work : Path
-        Where programs have their working folders.
     note : callable
         Told in a sentence what is worth a line in the log.
+
+    Raises
+    ------
+    ValueError
+        If no other process could make the oracle.
     """
     table = config.executor
     if table.name == "in_process":
         return InProcess(oracle)
-    recipe = Recipe(
-        f"flexdoce-{uuid4().hex}",
-        partial(made_oracle, config, work.absolute()),
-        type(oracle).__module__,
-        identity(oracle),
-        len(oracle.responses),
-    )
+    recipe = Recipe(f"flexdoce-{uuid4().hex}", oracles.recipe(oracle).make, identity(oracle), len(oracle.responses))
     workers = table.workers or cores()
     if table.name == "processes":
         return Processes(recipe, workers, table.batch, note)

@@ -7,9 +7,8 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib import import_module
 from types import FrameType
 
 import numpy as np
@@ -36,8 +35,6 @@ class Recipe:
         Names the oracle among those of a worker, which may serve several studies.
     make : callable
         Gives the oracle; it can be pickled.
-    module : str
-        Of the oracle's class. Importing it registers what is registered there.
     identity : str
         What the oracle must be, as the store writes it.
     n_responses : int
@@ -45,7 +42,6 @@ class Recipe:
 
     token: str
     make: Callable[[], Oracle]
-    module: str
     identity: str
     n_responses: int
 
@@ -65,10 +61,9 @@ def prepare(recipe: Recipe) -> str:
     """
     if recipe.token in _ORACLES:
         return here()
-    with suppress(ImportError):
-        import_module(recipe.module)
     try:
         oracle = recipe.make()
+        oracle.prepare()
     except Exception as error:
         raise InputError(f"worker {here()} cannot make the oracle: {error}") from None
     if identity(oracle) != recipe.identity:

@@ -1,12 +1,13 @@
 """What the report shows, as plain rows of text and numbers for the template."""
 
 import json
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from experiments.designs import METHODS, level_discrepancy_squared
-from experiments.oracles import Shape
+from experiments.oracles import Shape, asked
 from experiments.oracles.plots import exaggeration, is_planar, size
 from surrogates import Surrogate, Verdict, affine_inverse, affine_map
 from surrogates.candidates import AUTO
@@ -261,7 +262,7 @@ def shapes(outcome: Outcome) -> list[tuple[str, Shape]]:
         point = space.centre.copy()
         point[i] = factor.high
         cases.append((f"{factor.name} = {number(factor.high)} {factor.unit}, others at mid-range", point))
-    drawn = [(label, oracle.shape(point)) for label, point in cases]
+    drawn = [(label, asked(oracle, "shape", partial(oracle.shape, point))) for label, point in cases]
     return [(label, shape) for label, shape in drawn if shape is not None]
 
 

@@ -1,6 +1,7 @@
 """The contract of every oracle: inherit :class:`OracleContract`."""
 
 import json
+import pickle
 from dataclasses import replace
 from functools import cache
 from itertools import product
@@ -44,6 +45,17 @@ class OracleContract:
         assert oracle.version
         assert 0.0 <= oracle.resolution < 1.0
         assert oracle.batch >= 1
+
+    def test_passes_what_everybody_can_check(self, oracle):
+        if hasattr(oracle, "jacobian") and not isinstance(oracle, JaxOracle):
+            pytest.skip("its Jacobian would be compiled for this alone; it has tests of its own")
+        runs = oracles.check_oracle(oracle)
+        assert runs.ok.all()
+
+    def test_can_be_made_in_another_process(self, name, oracle):
+        again = pickle.loads(pickle.dumps(oracles.recipe(oracle))).make()
+        assert type(again) is type(oracle)
+        assert again.parameters == oracle.parameters
 
     def test_factors_have_units_and_a_source(self, oracle):
         assert isinstance(oracle.factors, FactorSpace)

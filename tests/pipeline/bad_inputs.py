@@ -61,7 +61,7 @@ BAD = [
     Bad("number for the name", 'name = 3\n[oracle]\nname = "cantilever"\n', r"name should be a string, got 3"),
     Bad("spaces in the name", 'name = "a b"\n[oracle]\nname = "cantilever"\n', r"letters, digits and underscores"),
     Bad("newline in the name", 'name = "a\\n"\n[oracle]\nname = "cantilever"\n', r"letters, digits and underscores"),
-    Bad("text for a table", 'name = "bad"\noracle = "cantilever"\n', r"oracle should be a .*, got 'cantilever'"),
+    Bad("number for a table", 'name = "bad"\noracle = 3\n', r"oracle should be a .*, got 3"),
     appended("list for a table", "[[factors]]\nlow = 1.0", r"factors should be a .*, got \["),
     appended("text for a design", '[fit]\ndesign = "uniform"', r"fit\.design should be a .*, got 'uniform'"),
     appended("true for a range", "[factors.load]\nlow = true\nhigh = 2.0", r"load\.low should be a number, got True"),
@@ -149,6 +149,23 @@ BAD = [
     ),
     # Oracles.
     Bad("unknown oracle", 'name = "bad"\n[oracle]\nname = "cantilver"\n', r"'cantilver'; did you mean 'cantilever'\?"),
+    Bad("unknown oracle as a text", 'name = "bad"\noracle = "cantilver"\n', r"did you mean 'cantilever'\?"),
+    *(
+        Bad(f"oracle file {name}", f"name = 'bad'\noracle = '{name}'\n", match)
+        for name, match in (
+            ("/etc/oracle.py:spring", r"oracle\.name: the path '/etc/oracle\.py' is not allowed: use a relative path"),
+            ("../spring.py:spring", r"the path '\.\./spring\.py' is not allowed"),
+            ("in/../spring.py:spring", r"is not allowed"),
+            (".hidden/spring.py:spring", r"is not allowed"),
+            ("C:\\spring.py:spring", r"is not allowed"),
+            ("spring.py", r"'spring\.py' is not of the form path/to/file\.py:name"),
+            ("spring.py:", r"is not of the form"),
+            ("spring.py:os.system", r"is not of the form"),
+            ("os:system", r"is not of the form path/to/file\.py:name; one of an installed package goes by its name"),
+            ("my.package:spring", r"is not of the form"),
+            ("spring.py:spring", r"there is no file spring\.py in /.*relative to the config's folder|is from no file"),
+        )
+    ),
     appended("unknown parameter", "[oracle.parameters]\nyuong = 1.0", r"no setting 'yuong'; did you mean 'young'\?"),
     appended("impossible parameter", "[oracle.parameters]\nyoung = -1.0", r"young must be positive, got -1\.0"),
     # Designs.

@@ -10,7 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from experiments import Factor, FactorSpace, Response, oracles
+from experiments import Factor, FactorSpace, Response
 from experiments.oracles import PointOracle
 from experiments.settings import parameter
 
@@ -18,7 +18,6 @@ NOTES, KILL_ONCE, POISON, HOLD, SPOILT = "notes", "kill-once", "poison", "hold",
 """Files of its folder: who was asked; the next one asked ends; large points end; nobody answers; it cannot be made."""
 
 
-@oracles.register
 @dataclass(frozen=True)
 class Fragile(PointOracle):
     """Two polynomials of degree two in three factors."""

@@ -1,6 +1,7 @@
 """Executors: the same answers wherever they are found, and what a lost worker or scheduler costs."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -17,14 +18,15 @@ from experiments import Status, oracles
 from experiments.designs import Sobol
 from pipeline import InputError, executors, resolve
 from pipeline.cli import main
-from pipeline.config import parse_config
+from pipeline.config import load_config, parse_config
 from pipeline.executors import execute
 from pipeline.executors.processes import AHEAD
 from pipeline.points import PointStore
 from tests.pipeline.cases import reproducible
-from tests.pipeline.fragile import HOLD, KILL_ONCE, POISON, SPOILT, Fragile, asked
+from tests.pipeline.fragile import HOLD, KILL_ONCE, POISON, SPOILT, asked
 
 ROOT = Path(__file__).parents[2]
+SOURCE = Path(__file__).with_name("fragile.py")
 POSIX = pytest.mark.skipif(os.name != "posix", reason="NO SIGKILL HERE: no worker was killed")
 PARALLEL = ("processes", "dask")
 N = 24
@@ -36,7 +38,7 @@ def text(folder: Path, executor: str, pause: float = 0.0) -> str:
 name = "study"
 seed = 3
 [oracle]
-name = "fragile"
+name = "fragile.py:Fragile"
 parameters = {{ folder = "{folder}", pause = {pause} }}
 max_failed_fraction = 0.5
 [fit]
@@ -56,21 +58,19 @@ class Bench:
     def __init__(self, folder: Path, executor: str, pause: float = 0.0) -> None:
         self.folder, self.notes = folder, []
         self.config = parse_config(text(folder, executor, pause))
-        self.oracle = oracles.get("fragile", folder=str(folder), pause=pause)
+        self.oracle = oracles.get(f"{SOURCE}:Fragile", folder=str(folder), pause=pause)
         self.design = Sobol(N).generate(self.oracle.factors, rng=0)
 
     def run(self, tell=lambda tally: None):
         with (
             PointStore(self.folder / "points.sqlite", self.oracle) as store,
-            executors.make(self.config, self.oracle, self.folder / "work", self.notes.append) as executor,
+            executors.make(self.config, self.oracle, self.notes.append) as executor,
         ):
             return execute(self.oracle, self.design, store, "fit", tell, executor)
 
 
 @pytest.fixture(autouse=True)
-def _registered(monkeypatch):
-    if "fragile" not in oracles.names():
-        oracles.register(Fragile)
+def _parent(monkeypatch):
     monkeypatch.setenv("FRAGILE_PARENT", str(os.getpid()))
 
 
@@ -124,7 +124,7 @@ def test_workers_that_cannot_make_the_oracle(name, tmp_path):
 
 def test_workers_that_have_another_oracle(tmp_path, monkeypatch):
     bench = Bench(tmp_path, 'name = "processes"\nworkers = 1')
-    monkeypatch.setattr(Fragile, "version", "2")
+    monkeypatch.setattr(type(bench.oracle), "version", "2")
     with pytest.raises(InputError, match="has another version of the oracle 'fragile'"):
         bench.run()
 
@@ -212,6 +212,7 @@ class TestWholeStudy:
 
 def written(folder: Path, executor: str) -> Path:
     path = folder / "study.toml"
+    shutil.copy(SOURCE, folder)
     path.write_text(text(folder, executor), encoding="utf-8")
     return path
 
@@ -219,16 +220,16 @@ def written(folder: Path, executor: str) -> Path:
 def same(expected: dict[str, bytes], folder: Path) -> bool:
     """Whether two run folders agree in all that does not name the oracle's folder."""
     found = reproducible(folder / "run")
-    skip = {"config.toml", "model.json"} | {name for name in expected if name.startswith("exports/")}
+    skip = {"config.toml", "model.json", "oracle.json"} | {name for name in expected if name.startswith("exports/")}
     assert found.keys() == expected.keys()
     return all(found[name] == data for name, data in expected.items() if name not in skip)
 
 
 @contextmanager
 def begun(config: Path, folder: Path):
-    """``flexdoce run`` in a process group of its own; with the test's oracle."""
+    """``flexdoce run`` in a process group of its own."""
     arguments = ["run", str(config), "--out", str(folder / "run")]
-    code = f"import sys, tests.pipeline.fragile\nfrom pipeline.cli import main\nsys.exit(main({arguments!r}))"
+    code = f"import sys\nfrom pipeline.cli import main\nsys.exit(main({arguments!r}))"
     process = subprocess.Popen(
         [sys.executable, "-c", code], cwd=ROOT, start_new_session=True, stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": str(ROOT)},
@@ -295,13 +296,13 @@ def until(holds, seconds: float = 40.0) -> None:
 )  # fmt: skip
 def test_settings_that_do_not_go_together(executor, sentence, tmp_path):
     with pytest.raises(InputError, match=sentence):
-        resolve(parse_config(text(tmp_path, executor)))
+        resolve(load_config(written(tmp_path, executor)))
 
 
 def test_a_missing_package_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr("pipeline.study.find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"needs the package distributed; install flexdoce\[dask\]"):
-        resolve(parse_config(text(tmp_path, 'name = "dask"')))
+        resolve(load_config(written(tmp_path, 'name = "dask"')))
 
 
 def test_nobody_at_the_address(tmp_path, monkeypatch):
