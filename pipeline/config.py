@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from experiments.naming import suggestion
 from surrogates.candidates import HIGHEST
 
+from .comparing import CompareTable, with_models
 from .errors import InputError
 from .programs import ProgramTable, embedded
 from .strict import Number, Setting, Table
@@ -167,6 +168,7 @@ class Config(Table):
     require: RequireTable = RequireTable()
     command: CommandTable = CommandTable()
     export: ExportTable = ExportTable()
+    compare: list[CompareTable] = Field(default=[], description="models of other studies that the report shows beside")
 
 
 def load_config(path: str | Path, overrides: Sequence[str] = ()) -> Config:
@@ -183,6 +185,9 @@ def load_config(path: str | Path, overrides: Sequence[str] = ()) -> Config:
         reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
         raise InputError(f"cannot read the config {path}: {reason}") from None
     config = parse_config(text, str(path), overrides)
+    if config.compare:
+        compare = with_models(config.compare, Path(path).parent, str(path))
+        config = config.model_copy(update={"compare": compare})
     if config.oracle.command is None:
         return config
     # With the texts of its templates a config says all that it needs, wherever it is copied to.

@@ -1,7 +1,7 @@
 """A study: a config resolved into the objects that the stages work with."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import ceil
 from pathlib import Path
@@ -21,6 +21,7 @@ from surrogates.candidates import AUTO
 from surrogates.choosing import TAUGHT, Choice, natural_basis
 from surrogates.stepwise import FULLEST
 
+from .comparing import compared_models
 from .config import Config, FitTable
 from .errors import InputError
 
@@ -54,6 +55,8 @@ class Study:
         All factors of the oracle, with the config's ranges.
     screening_design : Design
     export_prefix : str
+    compared : dict
+        Models of other studies by name, to be shown beside this one's.
     """
 
     config: Config
@@ -61,6 +64,7 @@ class Study:
     space: FactorSpace
     screening_design: Design
     export_prefix: str
+    compared: dict[str, Surrogate] = field(default_factory=dict)
 
     def fill_method(self, n_factors: int) -> DesignMethod:
         """The filling design's method, sized for `n_factors` factors that act."""
@@ -159,7 +163,8 @@ def resolve(config: Config) -> Study:
         )
     for name in screening.keep:
         _checked("screening.keep", lambda name=name: space.index(name))
-    study = Study(config, oracle, space, design, config.export.prefix or config.name)
+    compared = compared_models(config.compare, space, oracle.responses)
+    study = Study(config, oracle, space, design, config.export.prefix or config.name, compared)
     _checked("screening.follow", lambda: study.folded_screening)
     fit = config.fit
     _checked(
