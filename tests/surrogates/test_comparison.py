@@ -1,5 +1,8 @@
 """Two models beside each other: numbers that can be worked out by hand."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -108,3 +111,15 @@ def test_others_are_refused():
         compare_models(OURS, units, runs_of(OURS.predict(POINTS)))
     with pytest.raises(ValueError, match=r"its range of b is 4 to 5 N, that of the study 0 to 4: .* nothing in common"):
         common_box(SPACE, box(("a", -1.0, 1.0), ("b", 4.0, 5.0)))
+
+
+def test_the_example_of_the_page():
+    """A deflection goes with 1/E, so that the softer cantilever's map is larger by the ratio of the moduli."""
+    page = (Path(__file__).parents[2] / "docs" / "compare.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    names = {}
+    exec(compile(code, "docs/compare.md", "exec"), names)
+    found = names["found"]
+    assert found.acts.sum() >= 7
+    assert_allclose(found.map_difference[found.acts], 71.7 / 69.0 - 1.0, rtol=1e-3)
+    assert found.theirs[0].largest > found.ours[0].largest
