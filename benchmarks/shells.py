@@ -7,6 +7,7 @@ that the first time takes a quarter of an hour and every other one a minute. It 
 import hashlib
 import json
 import platform
+import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -24,6 +25,8 @@ from experiments.oracles import Oracle
 from experiments.runs import Runs
 from experiments.shells import Sheet
 from pipeline import load_config, resolve
+from pipeline.stages import fill_design
+from pipeline.study import Study
 from surrogates import PolynomialRegressor, Surrogate
 from surrogates.discrepancy import correct
 
@@ -34,7 +37,7 @@ SHELLS = ROOT / "configs" / "hexflex_calculix.toml"
 CACHE = ROOT / "runs" / "shells_benchmark"
 
 SIZES = {7: 3, 12: 3, 20: 3, 30: 3, 60: 1}
-"""Shell runs to spend, and how many designs of that size."""
+"""Shell runs to spend, and how many designs of that size; that of 60 is the study's own."""
 
 N_FRESH, N_BEAMS, CHEAP_DEGREE = 60, 400, 4
 
@@ -122,14 +125,17 @@ def worst(said: Array, fresh: Runs) -> float:
 def table(cache: Path = CACHE) -> str:
     """The whole comparison as Markdown."""
     cache.mkdir(parents=True, exist_ok=True)
-    shells = resolve(load_config(SHELLS)).oracle
+    study = resolve(load_config(SHELLS))
+    shells = study.oracle
     if why := getattr(shells, "missing", ""):
         raise SystemExit(why)
     space = shells.factors
     fresh = answered(shells, Random(N_FRESH).generate(space, 99), cache)
-    designs = {n: [_design(shells, n, seed, cache) for seed in range(many)] for n, many in SIZES.items()}
+    designs = {
+        n: [answered(shells, _design(study, n, seed), cache) for seed in range(many)] for n, many in SIZES.items()
+    }
     lines = []
-    for label, others in (("the shells' dimensions", {}), ("dimensions identified with beams", _own())):
+    for label, others in (("the shells' dimensions", {}), ("their own dimensions, identified from Eq. 2.6", _own())):
         oracle = beams(**others)
         cheap, seconds = cheap_model(oracle)
         itself = _row("beams alone", lambda n, s, cheap=cheap: cheap.predict(fresh.design.physical), fresh)
@@ -148,8 +154,12 @@ def _own() -> dict[str, Any]:
     return {name: getattr(default, name) for name in ("length_1", "length_2", "width", "thickness")}
 
 
-def _design(shells: Oracle, n_runs: int, seed: int, cache: Path) -> Runs:
-    return answered(shells, Uniform(n_runs, levels=n_runs).generate(shells.factors, seed), cache)
+def _design(study: Study, n_runs: int, seed: int) -> Design:
+    """The study's own design where it is of that size, else one with as many levels as runs."""
+    own = study.config.fit.design.settings["n_runs"]
+    if n_runs == own:
+        return fill_design(study, study.space.names)
+    return Uniform(n_runs, levels=n_runs).generate(study.space, seed)
 
 
 def _row(name: str, say: Callable[[int, int], Array | None], fresh: Runs) -> str:
@@ -157,21 +167,27 @@ def _row(name: str, say: Callable[[int, int], Array | None], fresh: Runs) -> str
     for n, many in SIZES.items():
         said = [say(n, s) for s in range(many)]
         found = [worst(one, fresh) for one in said if one is not None]
-        spread = f" ({min(found):.2g} – {max(found):.2g})" if len(set(found)) > 1 else ""
-        cells.append(f"{np.median(found):.2g}{spread}" if found else "")
+        spread = f" ({_short(min(found))} – {_short(max(found))})" if len(set(found)) > 1 else ""
+        cells.append(f"{_short(float(np.median(found)))}{spread}" if found else "")
     return f"| {name} | {' | '.join(cells)} |"
 
 
+def _short(value: float) -> str:
+    return f"{value:.0f}" if value >= 10.0 else f"{value:.2g}"
+
+
 def _head() -> str:
+    said = subprocess.run(["ccx", "-v"], capture_output=True, text=True, check=False).stdout.split()
     packages = ", ".join(f"{p} {version(p)}" for p in ("numpy", "scipy", "jax"))
     return (
         "### Two fidelities: beams corrected with a few shell runs\n\n"
         f"`python -m benchmarks.shells`, {datetime.now(UTC):%Y-%m-%d}, {platform.processor() or platform.machine()}, "
-        f"Python {platform.python_version()}, {packages}, CalculiX of `configs/hexflex_calculix.toml`.\n"
+        f"Python {platform.python_version()}, {packages}, ccx {said[-1] if said else '?'} "
+        "by `configs/hexflex_calculix.toml`.\n"
         f"Large displacements, ±1 N. Largest error over {N_FRESH} fresh shell runs in % of a response's range, worst "
-        "response: median of the designs (least – most). Uniform designs, as many levels as runs: "
-        f"{', '.join(f'{many} of {n}' for n, many in SIZES.items())}. The cheap model is a polynomial of degree "
-        f"{CHEAP_DEGREE} from {N_BEAMS} beam runs.\n"
+        "response: median of the designs (least – most). Uniform designs, as many levels as runs but for the "
+        f"study's own: {', '.join(f'{many} of {n}' for n, many in SIZES.items())}. The cheap model is a polynomial of "
+        f"degree {CHEAP_DEGREE} from {N_BEAMS} beam runs.\n"
     )
 
 
