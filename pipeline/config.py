@@ -12,6 +12,7 @@ from experiments.naming import suggestion
 from experiments.oracles.files import is_file
 from surrogates.candidates import HIGHEST
 
+from .comparing import CompareTable, with_models
 from .errors import InputError
 from .programs import ProgramTable, embedded
 from .strict import Number, Setting, Table
@@ -214,6 +215,7 @@ class Config(Table):
     require: RequireTable = RequireTable()
     command: CommandTable = CommandTable()
     export: ExportTable = ExportTable()
+    compare: list[CompareTable] = Field(default=[], description="models of other studies that the report shows beside")
     executor: ExecutorTable = ExecutorTable()
     sweep: SweepTable | None = Field(
         default=None, description="lists of values by dotted key: the grid that flexdoce sweep runs"
@@ -248,6 +250,9 @@ def load_config(path: str | Path, overrides: Sequence[str] = ()) -> Config:
     config = parse_config(text, str(path), overrides)
     if is_file(config.oracle.name):
         config._home = Path(path).parent
+    if config.compare:
+        compare = with_models(config.compare, Path(path).parent, str(path))
+        config = config.model_copy(update={"compare": compare})
     if config.oracle.command is None:
         return config
     # With the texts of its templates a config says all that it needs, wherever it is copied to.

@@ -11,6 +11,7 @@ from experiments.designs import Design, Random
 from experiments.runs import Runs, Status
 from experiments.screening import Adequacy, Screening
 from surrogates import RoundTrip, Surrogate, dumps, loads, obstacle
+from surrogates.comparison import Comparison
 from surrogates.exports.verification import Outcome as Verified
 
 from . import executors, exporting, stages, tables
@@ -95,6 +96,11 @@ class Outcome:
         fit, origin = self.study.config.fit, self.model.provenance
         used = origin.get("fit_degree", fit.degree), origin.get("fit_selection", fit.selection)
         return fit if used == (fit.degree, fit.selection) else wider(fit)
+
+    @property
+    def comparisons(self) -> dict[str, Comparison]:
+        """Models of other studies beside this one's, by the names that the config gives them."""
+        return stages.comparisons(self.study, self.model, self.validation_runs)
 
     @property
     def obstacle(self) -> str:
@@ -233,6 +239,8 @@ class _Runner:
                 self._write_runs("validation", grown.validation_runs)
                 folder.write(ROUNDS, rounds_csv(grown.rounds))
             folder.write("validation/errors.csv", table)
+            for name, found in stages.comparisons(study, grown.model, grown.validation_runs).items():
+                folder.write(f"validation/compare_{name}.csv", tables.comparison_csv(found))
         with self._timed("fit"):
             model = stages.certified(study, kept, grown.model, grown.fitted.fit)
         return replace(grown, model=model)

@@ -14,6 +14,7 @@ from experiments.runs import Runs
 from experiments.screening import Adequacy, NextDesign, Screening, TooManyHoles, screen
 from surrogates import Inversion, RoundTrip, Surrogate, Verdict, certify, commanding, errors, obstacle, round_trip
 from surrogates.candidates import BETTER
+from surrogates.comparison import Comparison, compare_models
 from surrogates.links import NotPositive
 
 from .config import FitTable, dump_config
@@ -221,6 +222,12 @@ def validated(study: Study, surrogate: Surrogate, runs: Runs) -> Surrogate:
     """The model with its errors on fresh runs."""
     tolerate(study, runs, "validation")
     return replace(surrogate, validation=errors(surrogate, runs, study.oracle.resolution))
+
+
+def comparisons(study: Study, surrogate: Surrogate, runs: Runs) -> dict[str, Comparison]:
+    """The models that the config names, beside ours and beside the validation runs."""
+    resolution = study.oracle.resolution
+    return {name: compare_models(surrogate, theirs, runs, resolution) for name, theirs in study.compared.items()}
 
 
 def inversion_design(surrogate: Surrogate, runs: Runs) -> tuple[Runs, Inversion, Design]:

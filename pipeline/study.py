@@ -1,7 +1,7 @@
 """A study: a config resolved into the objects that the stages work with."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib.util import find_spec
 from math import ceil
@@ -23,6 +23,7 @@ from surrogates.candidates import AUTO
 from surrogates.choosing import TAUGHT, Choice, natural_basis
 from surrogates.stepwise import FULLEST
 
+from .comparing import compared_models
 from .config import Config, FitTable
 from .errors import InputError
 from .oracle_file import Code, code_of, recorded, unchanged
@@ -59,6 +60,8 @@ class Study:
     export_prefix : str
     code : Code or None
         The file that the oracle was loaded from, if it was.
+    compared : dict
+        Models of other studies by name, to be shown beside this one's.
     """
 
     config: Config
@@ -67,6 +70,7 @@ class Study:
     screening_design: Design
     export_prefix: str
     code: Code | None = None
+    compared: dict[str, Surrogate] = field(default_factory=dict)
 
     def fill_method(self, n_factors: int) -> DesignMethod:
         """The filling design's method, sized for `n_factors` factors that act."""
@@ -169,7 +173,8 @@ def resolve(config: Config, oracle: Oracle | None = None) -> Study:
         )
     for name in screening.keep:
         _checked("screening.keep", lambda name=name: space.index(name))
-    study = Study(config, oracle, space, design, config.export.prefix or config.name, code)
+    compared = compared_models(config.compare, space, oracle.responses)
+    study = Study(config, oracle, space, design, config.export.prefix or config.name, code, compared)
     _checked("screening.follow", lambda: study.folded_screening)
     fit = config.fit
     _checked(

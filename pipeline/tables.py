@@ -13,6 +13,7 @@ from experiments.naming import column_label
 from experiments.runs import Response, Runs
 from experiments.screening import Screening
 from surrogates import Inversion, InversionStatus, ResponseError, Surrogate
+from surrogates.comparison import Comparison
 from surrogates.exports.verification import Finding
 from surrogates.preimages import Preimages
 
@@ -78,6 +79,28 @@ def errors_csv(errors: Sequence[ResponseError], responses: Sequence[Response], s
     units = {r.name: r.unit for r in responses}
     levels = sorted({i.level for e in errors for i in e.intervals})
     return _csv(pd.DataFrame([_error_row(e, units[e.response], levels, space) for e in errors]))
+
+
+def comparison_csv(comparison: Comparison) -> str:
+    """One row per response: how far the models are apart, and each of them from the runs; where they are apart most.
+
+    Differences also over the response's range in these runs. Cells are empty where no run lies in the box of both.
+    """
+    rows = []
+    for j, response in enumerate(comparison.responses):
+        row: dict[str, Any] = {"response": response.name, "unit": response.unit, "n_runs": comparison.n_runs}
+        row["range"] = comparison.ranges[j]
+        for what, found in (("apart", comparison.apart), ("ours", comparison.ours), ("theirs", comparison.theirs)):
+            one = found[j] if found else None
+            row |= {
+                f"{what}_max_abs": one and one.largest,
+                f"{what}_max_relative_to_range": one and one.relative,
+                f"{what}_rms": one and one.rms,
+                f"{what}_rms_relative_to_range": one and one.relative_rms,
+            }
+        at = comparison.apart[j].at if comparison.apart else [None] * len(comparison.box)
+        rows.append(row | {f"apart_most_{label}": v for label, v in zip(comparison.box.labels, at, strict=True)})
+    return _csv(pd.DataFrame(rows))
 
 
 def findings_csv(findings: Sequence[Finding]) -> str:

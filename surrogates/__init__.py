@@ -16,6 +16,7 @@
 :mod:`.validation`,                      errors against fresh runs, and against runs left out
 :mod:`.cross_validation`
 :mod:`.learning_curve`                   how an error falls with the runs, and how many would do
+:mod:`.comparison`                        two models beside each other, and beside runs
 :mod:`.round_trip`                       wanted responses through the inverse and back through the oracle
 :mod:`.artefact`                         ``model.json``, read and written
 :mod:`.exports`                          code generated from the artefact alone

@@ -114,24 +114,30 @@ def _compared(
 ) -> ResponseError:
     size = np.abs(predicted - truth)
     worst = int(np.argmax(size))
-    largest, spread, size_of_truth = float(size[worst]), float(np.ptp(truth)), float(np.abs(truth).max())
-    moves = spread > resolution * size_of_truth
-    measure = spread if moves else size_of_truth
+    largest, spread, measure = float(size[worst]), float(np.ptp(truth)), yardstick(truth, resolution)
+    moves = spread > resolution * float(np.abs(truth).max())
     rmse = float(np.sqrt(np.mean(size**2)))
     return ResponseError(
         response.name,
         len(truth),
         largest,
         spread,
-        _ratio(largest, measure),
+        ratio(largest, measure),
         rmse,
         worst,
-        relative_rmse=_ratio(rmse, measure),
+        relative_rmse=ratio(rmse, measure),
         q2=_q2(size, truth - truth.mean() if moves else truth, measure),
     )
 
 
-def _ratio(error: float, measure: float) -> float:
+def yardstick(truth: NDArray[np.float64], resolution: float = 0.0) -> float:
+    """What errors of one response are divided by: its range, or its largest absolute value where it does not move."""
+    spread, largest = float(np.ptp(truth)), float(np.abs(truth).max())
+    return spread if spread > resolution * largest else largest
+
+
+def ratio(error: float, measure: float) -> float:
+    """Their quotient; infinite, or zero for no error, where the measure is zero."""
     return error / measure if measure > 0.0 else (0.0 if error == 0.0 else np.inf)
 
 

@@ -9,7 +9,7 @@ from jinja2 import Environment, StrictUndefined
 from experiments.designs import METHODS
 
 from ..runner import Outcome
-from . import commanded, figures, growing, holes, validation, views
+from . import commanded, comparing, figures, growing, holes, validation, views
 
 _HERE = files("pipeline.report")
 
@@ -67,6 +67,7 @@ def _content(outcome: Outcome, provenance: Mapping[str, Any]) -> dict[str, Any]:
         "intervals": validation.intervals(outcome),
         "validation_failures": outcome.validation_runs.failures(),
         "validation_figures": [figures.validation_figure(outcome, j) for j in n],
+        "comparisons": comparing.comparisons(outcome),
         "certificate": views.certificate(model),
         "boxes": commanded.boxes(outcome, model),
         "command": commanded.boxes(outcome, outcome.commanded),
