@@ -12,8 +12,13 @@ from experiments.naming import suggestion
 from surrogates.candidates import HIGHEST
 
 from .errors import InputError
+from .nesting import DEEPEST, excess
 from .programs import ProgramTable, embedded
 from .strict import Number, Setting, Table
+
+
+SHOWN = 120
+"""Characters of a wrong value in a message."""
 
 
 class FactorRange(Table):
@@ -192,6 +197,8 @@ def load_config(path: str | Path, overrides: Sequence[str] = ()) -> Config:
 
 def parse_config(text: str, origin: str = "config", overrides: Sequence[str] = ()) -> Config:
     """As :func:`load_config`, from text; `origin` names it in messages."""
+    if why := excess(text):
+        raise InputError(f"{origin} is no config: {why}")
     try:
         document = tomllib.loads(text)
     except RecursionError:
@@ -216,7 +223,14 @@ def assignments(overrides: Sequence[str]) -> dict[str, Any]:
 
 def dump_config(config: Config) -> str:
     """The config as resolved, in TOML; parsing it gives the same config."""
-    return tomli_w.dumps(config.model_dump(exclude_none=True))
+    text = tomli_w.dumps(config.model_dump(exclude_none=True))
+    # All texts are basic strings: what a terminal must not be sent raw can be escaped in them.
+    return text if text.isascii() else "".join(c if c.isprintable() or c == "\n" else _escaped(c) for c in text)
+
+
+def _escaped(character: str) -> str:
+    number = ord(character)
+    return f"\\u{number:04X}" if number < 2**16 else f"\\U{number:08X}"
 
 
 def json_schema() -> dict[str, Any]:
@@ -230,9 +244,11 @@ def _apply(document: dict[str, Any], override: str) -> None:
         raise InputError(f"--set {override!r} has characters that cannot be printed")
     key, equals, value = override.partition("=")
     parts = [p.strip() for p in key.split(".")]
-    if not equals or not all(parts):
+    if not equals or not all(parts) or len(parts) > DEEPEST:
         raise InputError(f"--set {override!r} is not of the form dotted.key=value, such as fit.degree=3")
     try:
+        if why := excess(value):
+            raise InputError(f"--set {key}: {why}")
         parsed = tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
         parsed = value.strip()  # a word without quotes
@@ -270,7 +286,16 @@ def _sentence(error: ValidationError) -> str:
         allowed = "should be 1"
     if "pattern" in (first.get("ctx") or {}):
         allowed = "should be letters, digits and underscores, starting with a letter"
-    return f"{where} {allowed}, got {first['input']!r}"
+    return f"{where} {allowed}, got {_shown(first['input'])}"
+
+
+def _shown(value: Any) -> str:
+    """What came, as far as a message has room."""
+    try:
+        text = repr(value)
+    except RecursionError:
+        return "something nested too deep"
+    return text if len(text) <= SHOWN else f"{text[:SHOWN]}…"
 
 
 def _is_type_tag(part: Any) -> bool:

@@ -263,7 +263,7 @@ class _Runner:
     def _export(self) -> tuple[dict[str, str], list[str]]:
         """Generate every target from ``model.json`` as it lies in the folder; what the checks say, and what differs."""
         text, told, differing = self.folder.read("model.json"), {}, []
-        for name in self.study.config.export.targets:
+        for name in dict.fromkeys(self.study.config.export.targets):
             place = self.folder.path / "exports" / name
             files, notes = exporting.generate(text, name, self.study.export_prefix, {})
             exporting.write(place, files, force=True)

@@ -3,14 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import ceil
+from math import ceil, comb
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 import numpy as np
 
 from experiments import designs, oracles
-from experiments.designs import Design, DesignMethod, Halton, Random, Sobol, Uniform
+from experiments.designs import Design, DesignMethod, DOptimal, Halton, LatinHypercube, Random, Sobol, Uniform
 from experiments.designs.uniform import MOST_RUNS
 from experiments.factors import FactorSpace
 from experiments.oracles import Oracle
@@ -37,6 +37,12 @@ ROOMY = 2
 
 SEQUENCES = (Sobol, Halton, Random)
 """Designs of which a longer one begins with the shorter one."""
+
+UNSCREENED = (*SEQUENCES, LatinHypercube, Uniform, DOptimal)
+"""Designs whose columns are not orthogonal by construction: not even generated for a screening, some take minutes."""
+
+MOST_SCREENED, MOST_CANDIDATES = 4096, 50_000
+"""Runs of a screening and candidate terms of a fit: a config with more is a slip, or wants to fill the memory."""
 
 STAGES = ("screening", "fit", "validation", "inversion")
 """Stages that run the oracle, in order; each has a folder of its own and a seed of its own."""
@@ -65,7 +71,7 @@ class Study:
     def fill_method(self, n_factors: int) -> DesignMethod:
         """The filling design's method, sized for `n_factors` factors that act."""
         fit = self.config.fit
-        wanted = fit.runs_per_term * len(self.candidates(n_factors))
+        wanted = fit.runs_per_term * self.count_candidates(n_factors)
         return designs.get(fit.design.method, fit.design.settings, at_least=wanted)
 
     @cached_property
@@ -83,6 +89,18 @@ class Study:
         degree = self.config.fit.degree
         return Terms.polynomial(names, QUADRATIC if degree == AUTO else int(degree), self.config.fit.interactions)
 
+    def count_candidates(self, n_factors: int) -> int:
+        """How many terms :meth:`candidates` has; ``ValueError`` if there are too many to be written down."""
+        degree, interactions = self.config.fit.degree, self.config.fit.interactions
+        degree = QUADRATIC if degree == AUTO else int(degree)
+        count = comb(n_factors + degree, degree) if interactions else 1 + n_factors * degree
+        if count > MOST_CANDIDATES:
+            raise ValueError(
+                f"a degree-{degree} polynomial in {n_factors} factors has {count} terms, at most {MOST_CANDIDATES} are "
+                "considered; use a lower fit.degree, fit.interactions = false or fewer factors"
+            )
+        return count
+
     def fewest_runs(self, n_factors: int, fit: FitTable | None = None) -> int:
         """Runs below which no polynomial of the config, or of `fit`, can be fitted in that many factors.
 
@@ -91,7 +109,7 @@ class Study:
         fit = fit or self.config.fit
         if fit.degree == AUTO or (fit.trim and fit.selection != "backward"):
             return ceil((n_factors + 1) / FULLEST)
-        return len(self.candidates(n_factors))
+        return self.count_candidates(n_factors)
 
     def sizes(self, first: int) -> tuple[int, ...]:
         """Runs in all after each addition to a filling design of `first` runs; empty if it does not grow.
@@ -147,17 +165,12 @@ def resolve(config: Config) -> Study:
     space = _checked("factors", lambda: _space(config, oracle))
     screening = config.screening
     method = _checked("screening.design", lambda: designs.get(screening.design.method, screening.design.settings))
-    design = _checked("screening.design", lambda: method.generate(space, _seed(config, "screening")))
-    try:
-        n_contrasts = count_contrasts(design)
-    except ValueError as error:
-        named = f"screening.design: {screening.design.method!r} is not a two-level design that can be screened with"
-        raise InputError(f"{named} ({error}); use 'plackett_burman'") from None
-    if n_contrasts < 3:
+    design = _checked("screening.design", lambda: _screening_design(config, method, space))
+    if _count_contrasts(design) < 3:
         raise InputError(
             "screening.design: Lenth's method needs at least 3 contrasts, dummies and products included; use more runs"
         )
-    for name in screening.keep:
+    for name in dict.fromkeys(screening.keep):
         _checked("screening.keep", lambda name=name: space.index(name))
     study = Study(config, oracle, space, design, config.export.prefix or config.name)
     _checked("screening.follow", lambda: study.folded_screening)
@@ -171,6 +184,27 @@ def resolve(config: Config) -> Study:
     _check_exports(study)
     _check_command(study)
     return study
+
+
+def _screening_design(config: Config, method: DesignMethod, space: FactorSpace) -> Design:
+    if isinstance(method, UNSCREENED):
+        _refuse_screening(method.method, "its columns are not orthogonal by construction")
+    design = method.generate(space, _seed(config, "screening"))
+    if len(design) > MOST_SCREENED:
+        raise ValueError(f"{len(design)} runs are more than a screening can have; use {MOST_SCREENED} or fewer")
+    return design
+
+
+def _count_contrasts(design: Design) -> int:
+    try:
+        return count_contrasts(design)
+    except ValueError as error:
+        return _refuse_screening(design.method, str(error))
+
+
+def _refuse_screening(method: str, why: str) -> NoReturn:
+    named = f"screening.design: {method!r} is not a two-level design that can be screened with"
+    raise InputError(f"{named} ({why}); use 'plackett_burman'") from None
 
 
 def _oracle(config: Config) -> Oracle:
@@ -315,7 +349,7 @@ def _check_command(study: Study) -> None:
 def _check_exports(study: Study) -> None:
     """Refuse unknown targets, and a prefix that a target's language does not allow, before anything runs."""
     blank = _blank(study)
-    for name in study.config.export.targets:
+    for name in dict.fromkeys(study.config.export.targets):
         target = _checked("export.targets", lambda name=name: exports.get(name))
         _checked("export.prefix", lambda target=target: target.render(blank, study.export_prefix))
 
