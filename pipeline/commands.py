@@ -19,7 +19,7 @@ from surrogates.preimages import Preimages
 from . import exporting, tables
 from .config import assignments, dump_config, load_config
 from .console import console, design_table, print_findings, print_status, progress_bars, summary
-from .errors import InputError, RequirementNotMet, TooManyFailures
+from .errors import InputError, RequirementNotMet, TooManyFailures, one_line
 from .points import FAILURES
 from .reading import read_points
 from .signals import ended_like_ctrl_c
@@ -283,4 +283,4 @@ def _emit(text: str, out: str | None) -> None:
 
 
 def _warn(sentence: str) -> None:
-    print(f"flexdoce: {sentence}", file=sys.stderr)
+    print(f"flexdoce: {one_line(sentence)}", file=sys.stderr)

@@ -16,7 +16,6 @@ from .nesting import DEEPEST, excess
 from .programs import ProgramTable, embedded
 from .strict import Number, Setting, Table
 
-
 SHOWN = 120
 """Characters of a wrong value in a message."""
 
@@ -225,7 +224,7 @@ def dump_config(config: Config) -> str:
     """The config as resolved, in TOML; parsing it gives the same config."""
     text = tomli_w.dumps(config.model_dump(exclude_none=True))
     # All texts are basic strings: what a terminal must not be sent raw can be escaped in them.
-    return text if text.isascii() else "".join(c if c.isprintable() or c == "\n" else _escaped(c) for c in text)
+    return "".join(c if c.isprintable() or c == "\n" else _escaped(c) for c in text)
 
 
 def _escaped(character: str) -> str:

@@ -264,7 +264,7 @@ class _Runner:
         """Generate every target from ``model.json`` as it lies in the folder; what the checks say, and what differs."""
         text, told, differing = self.folder.read("model.json"), {}, []
         for name in dict.fromkeys(self.study.config.export.targets):
-            place = self.folder.path / "exports" / name
+            place = self.folder.inside(f"exports/{name}")
             files, notes = exporting.generate(text, name, self.study.export_prefix, {})
             exporting.write(place, files, force=True)
             if self.study.config.export.verify:

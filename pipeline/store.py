@@ -21,6 +21,10 @@ OURS = (
     "provenance.json", POINTS, f"{POINTS}-journal", f"{POINTS}-wal", f"{POINTS}-shm", "model.json", "report.html",
     "command.json", STATE, LOG, "screening", "fit", "validation", "inversion", "exports", WORK,
 )  # fmt: skip
+FOLDERS = ("screening", "fit", "validation", "inversion", "exports", WORK)
+MOST_READ = 256 * 2**20
+"""Bytes of a file of the folder that are read back."""
+
 LEFT_OVER = {LOCK, LOG, STATE, f"{STATE}.partial", f"{CONFIG}.partial"}
 """What a run leaves that was killed before its folder had a config."""
 
@@ -59,6 +63,7 @@ class RunFolder:
         """
         folder = cls(path)
         try:
+            folder._refuse_odd_files((LOCK, CONFIG) if fresh else (LOCK, CONFIG, *OURS))
             folder._owner(config, fresh)
             path.mkdir(parents=True, exist_ok=True)
             folder.lock = FolderLock(path)
@@ -71,6 +76,14 @@ class RunFolder:
             folder.__exit__(None, None, None)
             raise
         return folder
+
+    def _refuse_odd_files(self, names: Sequence[str]) -> None:
+        """Refuse links, pipes and the like where our files lie: a run writes in its own folder, and nowhere else."""
+        for place in (self.path / name for name in names):
+            if place.is_symlink():
+                raise InputError(_linked(place))
+            if place.exists() and not (place.is_dir() if place.name in FOLDERS else place.is_file()):
+                raise InputError(f"{place} is no plain {'folder' if place.name in FOLDERS else 'file'}: move it away")
 
     def _owner(self, config: Config, fresh: bool) -> Config | None:
         """The config that the folder belongs to, if it does; ``InputError`` if `config` cannot have it."""
@@ -103,6 +116,8 @@ class RunFolder:
         """A run folder that is there already, with its config; ``InputError`` if it is none."""
         if not (path / CONFIG).is_file():
             raise InputError(f"{path} is not a run folder: it has no {CONFIG}")
+        if (path / CONFIG).is_symlink():
+            raise InputError(_linked(path / CONFIG))
         return cls(path), load_config(path / CONFIG)
 
     @property
@@ -113,11 +128,23 @@ class RunFolder:
             f"the lock of {before} was left behind: that process is gone, and its lock was taken over" if before else ""
         )
 
+    def inside(self, name: str) -> Path:
+        """Where a file or folder of ours lies; ``InputError`` if a link on the way leads elsewhere."""
+        target = self.path / name
+        for place in (target, *target.parents):
+            if place == self.path:
+                return target
+            if place.is_symlink() and (place != target or place.is_dir()):
+                raise InputError(_linked(place))
+        raise ValueError(f"{name!r} is not inside of the folder")
+
     def write(self, name: str, text: str, durable: bool = True) -> Path:
         """Write a file of the folder whole: a reader never sees half of it, nor does the next run after a power cut."""
-        target = self.path / name
+        target = self.inside(name)
         target.parent.mkdir(parents=True, exist_ok=True)
         partial = target.with_name(target.name + ".partial")
+        if partial.is_symlink():
+            partial.unlink()
         partial.write_text(text, encoding="utf-8", newline="\n")
         if durable:
             flushed(partial)
@@ -127,15 +154,21 @@ class RunFolder:
     def peek(self, name: str) -> str:
         """Read a file of the folder; empty if it is missing or unreadable."""
         try:
-            return (self.path / name).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError):
+            return self.read(name)
+        except InputError:
             return ""
 
     def read(self, name: str) -> str:
-        """Read a file of the folder; ``InputError`` that says what to do if it is missing."""
+        """Read a file of the folder; ``InputError`` that says what to do if it is missing, or no plain file in it."""
         try:
-            return (self.path / name).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError):
+            place = (self.path / name).resolve(strict=True)
+            if not place.is_relative_to(self.path.resolve()):
+                raise InputError(_linked(self.path / name))
+            # A pipe of that name would be waited for without end.
+            if not place.is_file() or place.stat().st_size > MOST_READ:
+                raise InputError(f"{self.path / name} is no plain file of at most {MOST_READ} bytes")
+            return place.read_text(encoding="utf-8")
+        except (OSError, RuntimeError, UnicodeDecodeError):  # RuntimeError: links in a circle
             raise InputError(f"{self.path / name} is missing or unreadable: run the study again") from None
 
     def discard(self, name: str) -> None:
@@ -168,6 +201,8 @@ class RunFolder:
                 cache.mkdir(parents=True, exist_ok=True)
             except OSError as error:
                 raise InputError(f"cannot use the cache {cache}: {error.strerror}; name a folder") from None
+            if (cache / POINTS).is_symlink():
+                raise InputError(_linked(cache / POINTS))
             shared = PointStore(cache / POINTS, oracle, shared=True)
         try:
             return PointStore(self.path / POINTS, oracle, shared, retry)
@@ -175,3 +210,7 @@ class RunFolder:
             if shared is not None:
                 shared.close()
             raise
+
+
+def _linked(place: Path) -> str:
+    return f"{place} is a link: a run folder holds its own files; remove the link, or move what it points to there"
