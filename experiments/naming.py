@@ -40,6 +40,11 @@ def parse_column_label(label: str) -> tuple[str, str | None]:
     return (match.group(1), match.group(2)) if match else (label, None)
 
 
+def drawn(text: str) -> str:
+    """The text as matplotlib draws it: dollars are dollars, no formula; what cannot be printed is a space."""
+    return "".join(c if c.isprintable() else " " for c in text).replace("$", r"\$")
+
+
 def suggestion(word: str, known: Iterable[str]) -> str:
     """Half a sentence that names the nearest known word, or all of them: ``; did you mean 'uniform'?``."""
     known = list(known)

@@ -2,7 +2,7 @@
 
 import shutil
 from collections.abc import Sequence
-from pathlib import Path
+from pathlib import Path, PurePath
 from types import TracebackType
 
 from experiments.oracles import Oracle
@@ -130,13 +130,14 @@ class RunFolder:
 
     def inside(self, name: str) -> Path:
         """Where a file or folder of ours lies; ``InputError`` if a link on the way leads elsewhere."""
-        target = self.path / name
-        for place in (target, *target.parents):
-            if place == self.path:
-                return target
+        target, parts = self.path / name, PurePath(name).parts
+        if PurePath(name).is_absolute() or ".." in parts:
+            raise ValueError(f"{name!r} is not inside of the folder")
+        for place in (self.path.joinpath(*parts[: i + 1]) for i in range(len(parts))):
+            # A link in place of a file is replaced, not followed.
             if place.is_symlink() and (place != target or place.is_dir()):
                 raise InputError(_linked(place))
-        raise ValueError(f"{name!r} is not inside of the folder")
+        return target
 
     def write(self, name: str, text: str, durable: bool = True) -> Path:
         """Write a file of the folder whole: a reader never sees half of it, nor does the next run after a power cut."""
