@@ -1,4 +1,4 @@
-"""Paths stay inside the folders they were given: links, pipes and folders in place of files, in every folder we write."""
+"""Paths stay inside the folders they were given: links, pipes and folders in place of files, wherever we write."""
 
 import os
 import shutil
