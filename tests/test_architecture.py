@@ -305,8 +305,8 @@ class TestSize:
         assert "not its outputs" in (ast.get_docstring(TREES["experiments"]) or "")
 
 
-EVALUATING = {"eval", "exec", "compile", "__import__", "system", "popen", "execv", "execve", "execvp", "spawnl", "spawnv",
-              "getoutput", "getstatusoutput", "unsafe_load", "full_load"}  # fmt: skip
+EVALUATING = {"eval", "exec", "compile", "__import__", "system", "popen", "execv", "execve", "execvp", "spawnl",
+              "spawnv", "getoutput", "getstatusoutput", "unsafe_load", "full_load"}  # fmt: skip
 STATED = {
     "re.compile",  # patterns
     "importlib.import_module",  # names of our own modules

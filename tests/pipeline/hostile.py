@@ -15,7 +15,8 @@ EXAMPLES = int(os.environ.get("FLEXDOCE_FUZZ", "0"))
 
 PIECES = (
     "\x00", "\x1b[2J", "\x1b]0;x\x07", "\x9b31m", "\r", "\n", "\t", "\u2028", "\u202e", "\u2066", "\ufeff", "\xa0",
-    "\x7f", "é", "µm", "𝒳", "[bold]", "[/]", "[red", "<script>", "</script>", "{{", "}}", "{{ 7 * 7 }}", "$x_", "$", "\\",
+    "\x7f", "é", "µm", "𝒳", "[bold]", "[/]", "[red", "<script>", "</script>", "{{", "}}", "{{ 7 * 7 }}", "$x_", "$",
+    "\\",
     '"', "'",
     '"""', "..", "../", "/", "/etc/passwd", "C:\\", "=1+1", "__import__('os')", "`id`", "$(id)", ";", "%s", "a", "1",
     " ",
@@ -37,7 +38,8 @@ def fuzzed(few: int) -> settings:
     """Settings of a test with `few` examples, or as many as the environment asks for."""
     return settings(
         max_examples=EXAMPLES or few, deadline=None, derandomize=not EXAMPLES, database=None,
-        suppress_health_check=tuple(h for h in HealthCheck),
+        suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much, HealthCheck.data_too_large,
+                               HealthCheck.function_scoped_fixture],
     )  # fmt: skip
 
 

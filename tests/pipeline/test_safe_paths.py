@@ -184,3 +184,15 @@ class TestCache:
         (tmp_path / "cache").symlink_to(outside)
         assert run(tmp_path / "out", "--cache", str(tmp_path / "cache"))[0] == 0
         assert (outside / "points.sqlite").is_file()
+
+
+class TestExports:
+    @pytest.mark.parametrize("name", ["model.json", "verification.csv", "export.json", "study.c"])
+    def test_a_pipe_is_not_waited_for(self, name, folder, capsys):
+        place = folder / "exports" / "c99" / name
+        place.unlink(missing_ok=True)
+        os.mkfifo(place)
+        with within(20.0):
+            read_run(folder)
+            main(["verify", str(place.parent)])
+        assert "Traceback" not in capsys.readouterr().err
