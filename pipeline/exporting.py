@@ -62,7 +62,8 @@ def generate(
     """
     try:
         chosen = exports.get(target, settings)
-        files = {n: _bytes(content) for n, content in chosen.render(loads(model_text), prefix).items()}
+        exports.check_size(model := loads(model_text))
+        files = {n: _bytes(content) for n, content in chosen.render(model, prefix).items()}
         complete, notes = getattr(chosen, "complete", None), []
         if complete is not None:
             completed, notes = complete(files)

@@ -349,6 +349,8 @@ def _check_command(study: Study) -> None:
 def _check_exports(study: Study) -> None:
     """Refuse unknown targets, and a prefix that a target's language does not allow, before anything runs."""
     blank = _blank(study)
+    if study.config.export.targets:
+        _checked("export.targets", lambda: exports.check_size(blank))
     for name in dict.fromkeys(study.config.export.targets):
         target = _checked("export.targets", lambda name=name: exports.get(name))
         _checked("export.prefix", lambda target=target: target.render(blank, study.export_prefix))

@@ -192,9 +192,10 @@ LARGE = {
 }
 
 
-def of_a_program(n: int, first: str = "") -> str:
+def of_a_program(n: int, first: str = "", n_responses: int = 1) -> str:
     factors = {f"x{i}": {"unit": "m", "low": 0.0, "high": 1.0} for i in range(n)}
-    command = {**PROGRAM["oracle"]["command"], "factors": factors, "templates": {},
+    responses = {f"y{i}": {"unit": "m", "regex": "(.*)"} for i in range(n_responses)}
+    command = {**PROGRAM["oracle"]["command"], "factors": factors, "responses": responses, "templates": {},
                "argv": ["p", *(f"{{{{{name}}}}}" for name in factors)]}  # fmt: skip
     return first + tomli_w.dumps({"name": "many", "oracle": {"name": "command", "command": command}})
 
@@ -209,6 +210,7 @@ class TestLarge:
         [
             (of_a_program(1_001), "1001 factors are too many; at most 1000"),
             (of_a_program(30, "fit.degree = 12\n"), "a degree-12 polynomial in 30 factors has 11058116888 terms"),
+            (of_a_program(101, "fit.degree = 1\n", 100), "101 factors and 100 responses is too large"),
             (of_a_program(700), "no Plackett-Burman design for 700 factors"),
             (MINIMAL.replace("cantilever", "command") + f'command.argv = ["{"a" * 200_000}"]\ncommand.factors = {{}}\n'
              "command.responses = {}\n", "argv is longer than"),
