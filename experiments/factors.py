@@ -3,6 +3,7 @@
 import math
 import numbers
 import sys
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
@@ -73,7 +74,7 @@ class FactorSpace:
         if not self.factors:
             raise ValueError("a factor space needs at least one factor")
         if len(set(self.names)) < len(self.names):
-            repeated = sorted({n for n in self.names if self.names.count(n) > 1})
+            repeated = sorted(name for name, n in Counter(self.names).items() if n > 1)
             raise ValueError(f"factor names must differ; repeated: {', '.join(repeated)}")
 
     def __len__(self) -> int:

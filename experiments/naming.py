@@ -4,6 +4,9 @@ import re
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+MOST_LISTED = 40
+"""Known words that a message lists."""
+
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _UNIT = re.compile(r"[^\s\[\],\"'\\][^\[\],\"'\\\n\r\t]*")
 _COLUMN = re.compile(r"\s*([^\[\]]*?)\s*(?:\[([^\[\]]*)\])?\s*")
@@ -37,10 +40,16 @@ def parse_column_label(label: str) -> tuple[str, str | None]:
     return (match.group(1), match.group(2)) if match else (label, None)
 
 
+def drawn(text: str) -> str:
+    """The text as matplotlib draws it: dollars are dollars, no formula; what cannot be printed is a space."""
+    return "".join(c if c.isprintable() else " " for c in text).replace("$", r"\$")
+
+
 def suggestion(word: str, known: Iterable[str]) -> str:
     """Half a sentence that names the nearest known word, or all of them: ``; did you mean 'uniform'?``."""
     known = list(known)
     near = get_close_matches(word, known, n=1, cutoff=0.6)
     if near:
         return f"; did you mean {near[0]!r}?"
-    return f"; known are {', '.join(known)}" if known else ""
+    more = f" and {len(known) - MOST_LISTED} more" if len(known) > MOST_LISTED else ""
+    return f"; known are {', '.join(known[:MOST_LISTED])}{more}" if known else ""

@@ -7,8 +7,9 @@
 
 from .config import Config, load_config
 from .errors import FlexdoceError, InputError, RequirementNotMet, TooManyFailures
+from .resolving import resolve
 from .runner import Outcome, read_run, run
-from .study import Study, resolve
+from .study import Study
 from .sweeping import Sweep, sweep
 from .version import __version__
 

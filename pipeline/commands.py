@@ -18,15 +18,15 @@ from surrogates.preimages import Preimages
 from . import exporting, listing, tables
 from .config import assignments, dump_config, load_config
 from .console import console, design_table, print_findings, print_status, progress_bars, summary
-from .errors import InputError, RequirementNotMet, TooManyFailures
+from .errors import InputError, RequirementNotMet, TooManyFailures, one_line
 from .grid import parse_over
 from .oracle_file import code_of, not_loaded
 from .points import FAILURES
 from .reading import read_points
+from .resolving import resolve
 from .signals import ended_like_ctrl_c
 from .status import Standing, read_status
 from .store import RunFolder, SweepFolder
-from .study import resolve
 from .sweep_console import Bars, print_plan, sweep_summary
 from .sweeping import Progressing, planned, read_sweep_status
 from .sweeping import sweep as run_sweep
@@ -320,4 +320,4 @@ def _emit(text: str, out: str | None) -> None:
 
 
 def _warn(sentence: str) -> None:
-    print(f"flexdoce: {sentence}", file=sys.stderr)
+    print(f"flexdoce: {one_line(sentence)}", file=sys.stderr)

@@ -16,6 +16,7 @@ from experiments.designs import Design
 from surrogates.exports.verification import Finding
 from surrogates.exports.verification import Outcome as Verified
 
+from .errors import one_line
 from .executors import Progress as Told
 from .runner import Outcome
 from .tally import Tally, failures
@@ -129,7 +130,7 @@ def summary(outcome: Outcome) -> None:
         scale = response.shown_scale
         loop = f"{trip.errors[j].max_abs * scale:.2e}" if trip and trip.errors else "–"
         table.add_row(
-            f"{response.symbol} \\[{response.shown_unit}]",
+            escape(one_line(f"{response.symbol} [{response.shown_unit}]")),
             " ".join(outcome.screening.active_on(response.name)) or "none",
             str(len(model.terms_of(j))),
             f"{error.max_abs * scale:.2e}",
@@ -149,7 +150,8 @@ def summary(outcome: Outcome) -> None:
         console.print(f"{what + ':':<8}[bold]{escape(str(outcome.path / name))}[/bold]", soft_wrap=True)
     for name, told in outcome.exported.items():
         place = escape(str(outcome.path / "exports" / name))
-        console.print(f"{'Code:':<8}[bold]{place}[/bold]{escape(f' ({told})') if told else ''}", soft_wrap=True)
+        told = escape(one_line(f" ({told})")) if told else ""
+        console.print(f"{'Code:':<8}[bold]{place}[/bold]{told}", soft_wrap=True)
 
 
 def print_findings(where: str, findings: Sequence[Finding]) -> None:
@@ -157,7 +159,7 @@ def print_findings(where: str, findings: Sequence[Finding]) -> None:
     colours = {Verified.AGREES: "green", Verified.DIFFERS: "bold red", Verified.NOT_CHECKED: "yellow"}
     console.print(f"[bold]{escape(where)}[/bold]", soft_wrap=True)
     for one in findings:
-        detail = f"  [dim]{escape(one.detail)}[/dim]" if one.detail else ""
+        detail = f"  [dim]{escape(one_line(one.detail))}[/dim]" if one.detail else ""
         colour = colours[one.outcome]
         console.print(f"  [{colour}]{one.outcome:<11}[/] {escape(one.what)}{detail}", soft_wrap=True)
 

@@ -5,7 +5,7 @@ import sqlite3
 import time
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import closing
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -95,6 +95,7 @@ def _opened(connected: Callable[[], sqlite3.Connection], journal: str) -> sqlite
         if db.execute("PRAGMA journal_mode").fetchone()[0].upper() != journal:
             db.execute(f"PRAGMA journal_mode = {journal}")
         db.execute("PRAGMA locking_mode = NORMAL")
+        _refuse_programs(db)
         found = db.execute("PRAGMA quick_check(1)").fetchone()[0]
         if found != "ok":
             raise sqlite3.DatabaseError(found.replace("\n", " ").strip("* "))
@@ -120,6 +121,13 @@ def _update(db: sqlite3.Connection) -> None:
             db.execute(f"PRAGMA user_version = {FORMAT}")
     if missing := [name for name in OLD | NEW if name not in _columns(db)]:
         raise sqlite3.DatabaseError(f"its table has no column {missing[0]!r}")
+
+
+def _refuse_programs(db: sqlite3.Connection) -> None:
+    """Refuse views and triggers: we make none, and a table that is a view may compute for ever."""
+    found = db.execute("SELECT type, name FROM sqlite_master WHERE type IN ('view', 'trigger')").fetchone()
+    if found:
+        raise sqlite3.DatabaseError(f"it holds the {found[0]} {found[1]!r}, which is none of ours")
 
 
 def _columns(db: sqlite3.Connection) -> set[str]:
@@ -180,7 +188,8 @@ def counts(path: Path) -> dict[str, tuple[int, str]]:
             query = "SELECT status, COUNT(*), MAX(rowid) FROM points GROUP BY status"
             last = {status: (n, row) for status, n, row in db.execute(query)}
             reason = "SELECT reason FROM points WHERE rowid = ?"
-            return {status: (n, db.execute(reason, (row,)).fetchone()[0]) for status, (n, row) in last.items()}
+            told = {status: str(db.execute(reason, (row,)).fetchone()[0]) for status, (_, row) in last.items()}
+            return {str(status): (n, told[status]) for status, (n, _) in last.items()}
     except sqlite3.Error as error:
         raise InputError(f"cannot read the point store {path}: {error}") from None
 
@@ -194,8 +203,11 @@ def keys(path: Path) -> frozenset[str]:
         raise InputError(f"cannot read the point store {path}: {error}") from None
 
 
-def _read_only(path: Path) -> closing[sqlite3.Connection]:
-    return closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True, timeout=2.0))
+@contextmanager
+def _read_only(path: Path) -> Iterator[sqlite3.Connection]:
+    with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True, timeout=2.0)) as db:
+        _refuse_programs(db)
+        yield db
 
 
 def code(error: sqlite3.Error) -> int:

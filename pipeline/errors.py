@@ -1,8 +1,17 @@
 """Errors that end a command, each with its exit code and one sentence for the person who typed it."""
 
-import re
+LONGEST = 4000
+"""Characters of a sentence; what a hostile file quotes of itself may have millions."""
 
-_CONTROL = re.compile(r"[\x00-\x1f\x7f\ud800-\udfff]+")
+
+def one_line(text: str) -> str:
+    """The text for a terminal or a log: one line, and a space for what could move the cursor or turn the reading order.
+
+    That is every character that Python calls not printable: control characters, escapes, marks of direction,
+    surrogates. Of a very long text the middle is left out.
+    """
+    line = text if text.isprintable() else " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    return line if len(line) <= LONGEST else f"{line[: LONGEST // 2]} … {line[-LONGEST // 4 :]}"
 
 
 class FlexdoceError(Exception):
@@ -11,7 +20,7 @@ class FlexdoceError(Exception):
     exit_code = 1
 
     def __init__(self, sentence: str) -> None:
-        super().__init__(_CONTROL.sub(" ", sentence))
+        super().__init__(one_line(sentence))
 
 
 class InputError(FlexdoceError):

@@ -1,6 +1,7 @@
 """Folders of generated code: written whole, with the model they come from, and verified then and later."""
 
 import csv
+import errno
 import hashlib
 import io
 import json
@@ -61,7 +62,8 @@ def generate(
     """
     try:
         chosen = exports.get(target, settings)
-        files = {n: _bytes(content) for n, content in chosen.render(loads(model_text), prefix).items()}
+        exports.check_size(model := loads(model_text))
+        files = {n: _bytes(content) for n, content in chosen.render(model, prefix).items()}
         complete, notes = getattr(chosen, "complete", None), []
         if complete is not None:
             completed, notes = complete(files)
@@ -138,10 +140,8 @@ def verified(folder: Path) -> list[Finding]:
 def told(folder: Path) -> str:
     """What the last verification of an export found, in words; empty if there was none."""
     try:
-        outcomes = [
-            row["outcome"] for row in csv.DictReader(io.StringIO((folder / FINDINGS).read_text(encoding="utf-8")))
-        ]
-    except (OSError, ValueError, KeyError):
+        outcomes = [row["outcome"] for row in csv.DictReader(io.StringIO(_text(folder / FINDINGS)))]
+    except (OSError, ValueError, KeyError, csv.Error):
         return ""
     words = {Outcome.AGREES: "checks agree", Outcome.DIFFERS: "differ", Outcome.NOT_CHECKED: "not checked"}
     return ", ".join(f"{n} {word}" for outcome, word in words.items() if (n := outcomes.count(outcome)))
@@ -177,6 +177,13 @@ def _left_over(folder: Path, files: Mapping[str, bytes]) -> list[str]:
     return [*ours, FINDINGS] if (folder / FINDINGS).is_file() else ours
 
 
+def _text(path: Path) -> str:
+    """A plain file's text; a pipe of that name would be waited for without end."""
+    if not path.is_file():
+        raise FileNotFoundError(errno.ENOENT, "there is no plain file of that name", str(path))
+    return path.read_text(encoding="utf-8")
+
+
 def _digest(path: Path) -> str:
     """SHA-256 of a file; empty if there is none or it cannot be read."""
     try:
@@ -188,7 +195,7 @@ def _digest(path: Path) -> str:
 def _manifest(folder: Path) -> Manifest:
     path = folder / MANIFEST
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = json.loads(_text(path))
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"cannot read {path}: {getattr(error, 'strerror', None) or error}") from None
     found = document.get("schema") if isinstance(document, dict) else type(document).__name__
@@ -213,7 +220,7 @@ def _manifest(folder: Path) -> Manifest:
 def _read(folder: Path) -> tuple[Manifest, Surrogate]:
     manifest = _manifest(folder)
     try:
-        return manifest, loads((folder / MODEL).read_text(encoding="utf-8"))
+        return manifest, loads(_text(folder / MODEL))
     except (OSError, ValueError) as error:
         raise InputError(f"{folder / MODEL}: {getattr(error, 'strerror', None) or error}") from None
 
@@ -233,7 +240,7 @@ def _regenerated(folder: Path, manifest: Manifest) -> Finding:
     what = f"files generated once more from {MODEL}"
     try:
         target = exports.get(manifest.target, manifest.settings)
-        texts = target.render(loads((folder / MODEL).read_text(encoding="utf-8")), manifest.prefix)
+        texts = target.render(loads(_text(folder / MODEL)), manifest.prefix)
     except ValueError as error:
         return Finding(what, Outcome.DIFFERS, f"they cannot be: {error}")
     differing = sorted(set(texts) ^ (set(manifest.files) - {MODEL}))

@@ -19,8 +19,8 @@ from surrogates import Surrogate
 from surrogates.candidates import AUTO, BETTER
 
 from . import stages
-from .config import FitTable
 from .rounds import BUDGET, MET, RUNS, STALLED, TERMS, UNTRUE, Round
+from .sections import FitTable
 from .stages import Fitted
 from .study import Study, highest_degree
 

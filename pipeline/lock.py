@@ -12,6 +12,9 @@ from pathlib import Path
 from .errors import InputError
 
 LOCK = "run.lock"
+PLAIN = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+"""How a lock is opened: what a link of that name points to is not emptied, and a pipe is not waited for."""
+
 PATIENCE = 0.5
 """Seconds that a run waits for a lock; ``flexdoce status`` looks at it for an instant."""
 
@@ -36,7 +39,7 @@ class Owner:
             return True
         try:
             os.kill(self.pid, 0)
-        except ProcessLookupError:
+        except (ProcessLookupError, OverflowError):
             return False
         except OSError:
             return True
@@ -72,7 +75,7 @@ class FolderLock:
     def _acquired(self) -> int:
         until = time.monotonic() + PATIENCE
         while True:
-            descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o644)
+            descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | PLAIN, 0o644)
             try:
                 if self._is_mine(descriptor):
                     return descriptor
@@ -125,11 +128,13 @@ def holder(folder: Path) -> Owner | None:
     """Who runs in a folder at this moment; None if nobody does. Changes nothing."""
     path = folder / LOCK
     try:
-        descriptor = os.open(path, os.O_RDONLY)
+        descriptor = os.open(path, os.O_RDONLY | PLAIN)
     except OSError:
         return None
     try:
         owner, is_free = _owner(descriptor), _locked(descriptor, shared=True)
+    except OSError:
+        return None  # a folder or a pipe of that name
     finally:
         os.close(descriptor)
     if owner is None or is_free or (is_free is None and not owner.is_alive):
@@ -171,7 +176,7 @@ def _parsed(data: bytes) -> Owner | None:
     try:
         found = json.loads(data)
         return Owner(int(found["pid"]), str(found["host"]), str(found["since"]))
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
         return None
 
 

@@ -4,6 +4,8 @@ import logging
 from contextlib import suppress
 from pathlib import Path
 
+from .errors import one_line
+
 LOG = "log.txt"
 LAYOUT = logging.Formatter("%(asctime)s  %(message)s", "%Y-%m-%d %H:%M:%S")
 
@@ -25,9 +27,9 @@ class Log:
         self._handler.setFormatter(LAYOUT)
 
     def write(self, sentence: str) -> None:
-        """One line; line ends within it become spaces."""
+        """One line; line ends within it, and what could steer a terminal, become spaces."""
         if self._handler is not None:
-            text = " ".join(sentence.split())
+            text = one_line(" ".join(sentence.split()))
             self._handler.handle(logging.LogRecord("flexdoce", logging.INFO, "", 0, text, None, None))
 
     def close(self) -> None:

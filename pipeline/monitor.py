@@ -21,6 +21,9 @@ STATE_EVERY, LOG_EVERY = 1.0, 60.0
 MOST_REASONS = 20
 """Failures of a stage that the log gives one by one; all are in its ``runs.csv``."""
 
+LARGEST = 1e15
+"""Numbers of a sound state are smaller: no clock, count or speed has more digits."""
+
 FINISHED, STOPPED, FAILED = "finished", "stopped", "failed"
 
 
@@ -68,8 +71,11 @@ class State:
             state = cls(**json.loads(text))
         except (ValueError, TypeError, RecursionError):
             return None
-        numbers = (state.pid, state.started, state.updated, state.done, state.total, state.known)
-        is_sound = all(isinstance(n, int | float) for n in numbers) and isinstance(state.failed, dict)
+        numbers = [state.pid, state.started, state.updated, state.done, state.total, state.known]
+        numbers += [n for n in (state.rate, state.left) if n is not None]
+        texts = (state.study, state.host, state.stage, state.ended, state.reason)
+        is_sound = all(isinstance(n, int | float) and abs(n) < LARGEST for n in numbers)
+        is_sound &= all(isinstance(t, str) for t in texts) and isinstance(state.failed, dict)
         return state if is_sound and all(isinstance(n, int) for n in state.failed.values()) else None
 
     @property

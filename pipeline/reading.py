@@ -7,6 +7,7 @@ a cell too many, renames doubled columns, and takes ``True`` for a number.
 import csv
 import io
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -22,7 +23,8 @@ from .errors import InputError
 
 CODED = "coded"
 NOT_FINITE = {"", "nan", "inf", "-inf", "+inf", "infinity", "-infinity"}
-_NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
+# Possessive: a cell of 100,000 digits and a letter would take minutes.
+_NUMBER = re.compile(r"\s*+[+-]?(\d++\.?\d*+|\.\d++)([eE][+-]?\d++)?\s*+", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -52,8 +54,8 @@ class Table:
         if not lines:
             raise InputError(f"{origin} is not a CSV table: it is empty, and its first row must name the columns")
         header = tuple(cell.strip() for cell in lines[0])
-        for label in header:
-            if header.count(label) > 1:
+        for label, n in Counter(header).items():
+            if n > 1:
                 raise InputError(f"{origin}: the column {parse_column_label(label)[0]!r} appears twice")
         for i, line in enumerate(lines[1:], start=1):
             if len(line) != len(header):

@@ -15,7 +15,7 @@ from surrogates.comparison import Comparison
 from surrogates.exports.verification import Outcome as Verified
 
 from . import executors, exporting, stages, tables
-from .config import FitTable, load_config
+from .config import load_config
 from .errors import FlexdoceError, InputError
 from .executors import Executor, Progress, execute, silent
 from .growth import Grown, grow, wider
@@ -24,10 +24,12 @@ from .oracle_file import noted
 from .points import PointStore
 from .provenance import provenance_json, read_provenance
 from .reading import Table, read_runs
+from .resolving import ready, resolve, restored
 from .rounds import Round, read_rounds, rounds_csv
+from .sections import FitTable
 from .stages import Fitted
 from .store import WORK, RunFolder
-from .study import STAGES, Study, ready, resolve, restored
+from .study import STAGES, Study
 
 ROUNDS = "fit/rounds.csv"
 
@@ -290,8 +292,8 @@ class _Runner:
     def _export(self) -> tuple[dict[str, str], list[str]]:
         """Generate every target from ``model.json`` as it lies in the folder; what the checks say, and what differs."""
         text, told, differing = self.folder.read("model.json"), {}, []
-        for name in self.study.config.export.targets:
-            place = self.folder.path / "exports" / name
+        for name in dict.fromkeys(self.study.config.export.targets):
+            place = self.folder.inside(f"exports/{name}")
             files, notes = exporting.generate(text, name, self.study.export_prefix, {})
             exporting.write(place, files, force=True)
             if self.study.config.export.verify:

@@ -17,10 +17,12 @@ from surrogates.candidates import BETTER
 from surrogates.comparison import Comparison, compare_models
 from surrogates.links import NotPositive
 
-from .config import FitTable, dump_config
+from .config import dump_config
 from .errors import InputError, TooManyFailures
+from .resolving import check_levels, check_runs
 from .rounds import Round, ending
-from .study import Study, check_levels, check_runs, highest_degree
+from .sections import FitTable
+from .study import Study, highest_degree
 from .version import __version__
 
 INVERSE = "inverse"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from . import database
-from .errors import InputError
+from .errors import InputError, one_line
 from .lock import Owner, holder
 from .log import LOG
 from .monitor import FINISHED, STOPPED, State
@@ -62,7 +62,7 @@ class Standing:
             told.append(f"Go on: flexdoce run {self.folder / CONFIG} --out {self.folder}")
         if (self.folder / LOG).is_file():
             told.append(f"Log: {self.folder / LOG}")
-        return told
+        return [one_line(line) for line in told]
 
     @property
     def headline(self) -> str:
@@ -101,7 +101,9 @@ def read_status(folder: RunFolder, clock: Callable[[], float] = time.time) -> St
     store, points, trouble = folder.path / POINTS, {}, ""
     # The lock is read first: a run that ends in between has then written how.
     owner, state = holder(folder.path), State.parse(folder.peek(STATE))
-    if store.is_file():
+    if store.is_symlink():
+        trouble = f"{store} is a link and is not read"
+    elif store.is_file():
         try:
             points = database.counts(store)
         except InputError as error:

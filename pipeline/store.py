@@ -2,7 +2,7 @@
 
 import shutil
 from collections.abc import Sequence
-from pathlib import Path
+from pathlib import Path, PurePath
 from types import TracebackType
 from typing import ClassVar, Self
 
@@ -23,6 +23,10 @@ OURS = (
     "command.json", "oracle.json", "oracle.py", STATE, LOG, "screening", "fit", "validation", "inversion", "exports",
     WORK,
 )  # fmt: skip
+FOLDERS = ("screening", "fit", "validation", "inversion", "exports", WORK)
+MOST_READ = 256 * 2**20
+"""Bytes of a file of the folder that are read back."""
+
 LEFT_OVER = {LOCK, LOG, STATE, f"{STATE}.partial", f"{CONFIG}.partial"}
 """What a run leaves that was killed before its folder had a config."""
 
@@ -69,7 +73,7 @@ class RunFolder:
         """
         folder = cls(path)
         try:
-            folder._owner(config, fresh)
+            folder._refuse(config, fresh)
             path.mkdir(parents=True, exist_ok=True)
             folder.lock = FolderLock(path)
             # Another run may have come and gone since.
@@ -86,9 +90,21 @@ class RunFolder:
     def check(cls, path: Path, config: Config, fresh: bool = False) -> None:
         """Whether :meth:`claim` would give the folder, but for its lock; ``InputError`` if not. Touches nothing."""
         try:
-            cls(path)._owner(config, fresh)
+            cls(path)._refuse(config, fresh)
         except OSError as error:
             raise InputError(f"cannot use the output folder {path}: {error.strerror}") from None
+
+    def _refuse(self, config: Config, fresh: bool) -> None:
+        self._refuse_odd_files((LOCK, self.config_name, *(() if fresh else self.ours)))
+        self._owner(config, fresh)
+
+    def _refuse_odd_files(self, names: Sequence[str]) -> None:
+        """Refuse links, pipes and the like where our files lie: a run writes in its own folder, and nowhere else."""
+        for place in (self.path / name for name in names):
+            if place.is_symlink():
+                raise InputError(_linked(place))
+            if place.exists() and not (place.is_dir() if place.name in FOLDERS else place.is_file()):
+                raise InputError(f"{place} is no plain {'folder' if place.name in FOLDERS else 'file'}: move it away")
 
     def _owner(self, config: Config, fresh: bool) -> Config | None:
         """The config that the folder belongs to, if it does; ``InputError`` if `config` cannot have it."""
@@ -121,6 +137,8 @@ class RunFolder:
         """A run folder that is there already, with its config; ``InputError`` if it is none."""
         if not (path / cls.config_name).is_file():
             raise InputError(f"{path} is not a {cls.kind}: it has no {cls.config_name}")
+        if (path / cls.config_name).is_symlink():
+            raise InputError(_linked(path / cls.config_name))
         return cls(path), load_config(path / cls.config_name)
 
     @property
@@ -131,11 +149,24 @@ class RunFolder:
             f"the lock of {before} was left behind: that process is gone, and its lock was taken over" if before else ""
         )
 
+    def inside(self, name: str) -> Path:
+        """Where a file or folder of ours lies; ``InputError`` if a link on the way leads elsewhere."""
+        target, parts = self.path / name, PurePath(name).parts
+        if PurePath(name).is_absolute() or ".." in parts:
+            raise ValueError(f"{name!r} is not inside of the folder")
+        for place in (self.path.joinpath(*parts[: i + 1]) for i in range(len(parts))):
+            # A link in place of a file is replaced, not followed.
+            if place.is_symlink() and (place != target or place.is_dir()):
+                raise InputError(_linked(place))
+        return target
+
     def write(self, name: str, text: str, durable: bool = True) -> Path:
         """Write a file of the folder whole: a reader never sees half of it, nor does the next run after a power cut."""
-        target = self.path / name
+        target = self.inside(name)
         target.parent.mkdir(parents=True, exist_ok=True)
         partial = target.with_name(target.name + ".partial")
+        if partial.is_symlink():
+            partial.unlink()
         partial.write_text(text, encoding="utf-8", newline="\n")
         if durable:
             flushed(partial)
@@ -145,15 +176,21 @@ class RunFolder:
     def peek(self, name: str) -> str:
         """Read a file of the folder; empty if it is missing or unreadable."""
         try:
-            return (self.path / name).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError):
+            return self.read(name)
+        except InputError:
             return ""
 
     def read(self, name: str) -> str:
-        """Read a file of the folder; ``InputError`` that says what to do if it is missing."""
+        """Read a file of the folder; ``InputError`` that says what to do if it is missing, or no plain file in it."""
         try:
-            return (self.path / name).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError):
+            place = (self.path / name).resolve(strict=True)
+            if not place.is_relative_to(self.path.resolve()):
+                raise InputError(_linked(self.path / name))
+            # A pipe of that name would be waited for without end.
+            if not place.is_file() or place.stat().st_size > MOST_READ:
+                raise InputError(f"{self.path / name} is no plain file of at most {MOST_READ} bytes")
+            return place.read_text(encoding="utf-8")
+        except (OSError, RuntimeError, UnicodeDecodeError):  # RuntimeError: links in a circle
             raise InputError(f"{self.path / name} is missing or unreadable: run the study again") from None
 
     def discard(self, name: str) -> None:
@@ -186,6 +223,8 @@ class RunFolder:
                 cache.mkdir(parents=True, exist_ok=True)
             except OSError as error:
                 raise InputError(f"cannot use the cache {cache}: {error.strerror}; name a folder") from None
+            if (cache / POINTS).is_symlink():
+                raise InputError(_linked(cache / POINTS))
             shared = PointStore(cache / POINTS, oracle, shared=True)
         try:
             return PointStore(self.path / POINTS, oracle, shared, retry)
@@ -212,3 +251,7 @@ class SweepFolder(RunFolder):
         """Keep the grid of this time: another value added to a key makes no other sweep."""
         if self.peek(SWEEP) != dump_config(config):
             self.write(SWEEP, dump_config(config))
+
+
+def _linked(place: Path) -> str:
+    return f"{place} is a link: a run folder holds its own files; remove the link, or move what it points to there"

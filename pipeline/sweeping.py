@@ -18,10 +18,11 @@ from .errors import FlexdoceError, InputError, TooManyFailures
 from .executors import Progress, silent
 from .grid import Axis, Member, axes, members, of_ranges
 from .lock import Owner, holder
+from .resolving import ready, resolve
 from .runner import run
 from .status import read_status, stored
 from .store import CACHE, PAGE, TABLE, WORK, RunFolder, SweepFolder
-from .study import STAGES, Study, ready, resolve
+from .study import STAGES, Study
 from .tables import sweep_csv
 from .tally import Tally, Watcher
 

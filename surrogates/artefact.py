@@ -28,6 +28,9 @@ SCHEMA = "flexdoce-model/1"
 SCHEMA_WITH_LINKS = "flexdoce-model/2"
 """Of models with logarithms: a reader that knows none would take a logarithm for the response, and must refuse."""
 
+MOST_NAMES, MOST_EXPONENTS, HIGHEST = 1000, 1_000_000, 64
+"""Factors or responses, terms times either, and total degree of a term that are read: more than a study can have."""
+
 
 def schema_of(model: Surrogate) -> str:
     """The schema that the model is written in."""
@@ -87,6 +90,8 @@ def loads(text: str) -> Surrogate:
         json.dumps(document, ensure_ascii=False).encode()
     except UnicodeEncodeError:
         raise ValueError("it holds text that is not valid Unicode") from None
+    except RecursionError:
+        raise ValueError("not valid JSON: it is nested too deep") from None
     if not isinstance(document, Mapping) or document.get("schema") not in (SCHEMA, SCHEMA_WITH_LINKS):
         found = document.get("schema") if isinstance(document, Mapping) else type(document).__name__
         raise ValueError(
@@ -140,10 +145,15 @@ def _affine(model: Surrogate) -> dict[str, Any] | None:
 
 
 def _surrogate(document: Mapping[str, Any]) -> Surrogate:
-    factors = FactorSpace(tuple(build("factor", Factor, f) for f in _list(document, "factors")))
-    responses = tuple(build("response", Response, r) for r in _list(document, "responses"))
-    names, terms = [r.name for r in responses], _list(document, "terms")
+    _check_size(*(len(_list(document, key)) for key in ("factors", "responses", "terms")))
+    factors = FactorSpace(tuple(build("factor", Factor, f) for f in document["factors"]))
+    responses = tuple(build("response", Response, r) for r in document["responses"])
+    names, terms = [r.name for r in responses], document["terms"]
+    if len(set(names)) < len(names):
+        raise ValueError(f"response names must differ; got {', '.join(names)}")
     parsed = Terms.parse(terms, factors.names)
+    if (degree := max(map(sum, parsed.exponents), default=0)) > HIGHEST:
+        raise ValueError(f"a term has degree {degree}; models of degree {HIGHEST} at most are read")
     errors = tuple(_error(e, len(factors)) for e in _list(document, "validation"))
     if errors and [e.response for e in errors] != names:
         raise ValueError(f"validation must be empty or name {', '.join(names)} in this order")
@@ -158,6 +168,14 @@ def _surrogate(document: Mapping[str, Any]) -> Surrogate:
         _read_errors(document, names, len(terms)),
         _links(document, names),
     )
+
+
+def _check_size(n_factors: int, n_responses: int, n_terms: int) -> None:
+    """Refuse what would fill the memory: a file of 1 MB can name 10,000 factors and as many terms of each."""
+    if max(n_factors, n_responses) > MOST_NAMES:
+        raise ValueError(f"models of at most {MOST_NAMES} factors and as many responses are read")
+    if n_terms * max(n_factors, n_responses) > MOST_EXPONENTS:
+        raise ValueError(f"{n_terms} terms are too many for {n_factors} factors and {n_responses} responses")
 
 
 def _table(given: Any, what: str, names: Sequence[str], n_terms: int) -> NDArray[np.float64]:

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from experiments.naming import drawn
 from experiments.runs import Runs
 
 from .model import Surrogate
@@ -22,8 +23,8 @@ def parity(ax: "Axes", model: Surrogate, runs: Runs, response: int) -> "Axes":
     low, high = min(truth.min(), predicted.min()), max(truth.max(), predicted.max())
     ax.plot([low, high], [low, high], color=LINE, lw=0.8)
     ax.plot(truth, predicted, ".", color=POINT, ms=2.5, alpha=0.6, rasterized=True)
-    unit = shown.shown_unit
-    ax.set(xlabel=f"oracle [{unit}]", ylabel=f"model [{unit}]", title=f"{shown.symbol}: parity")
+    unit = drawn(shown.shown_unit)
+    ax.set(xlabel=f"oracle [{unit}]", ylabel=f"model [{unit}]", title=f"{drawn(shown.symbol)}: parity")
     return ax
 
 
@@ -36,6 +37,6 @@ def residuals(ax: "Axes", model: Surrogate, runs: Runs, response: int) -> "Axes"
     ax.plot(truth, error, ".", color=POINT, ms=2.5, alpha=0.6, rasterized=True)
     top = 1.15 * np.abs(error).max(initial=0.0)
     ax.set_ylim(-top or -1.0, top or 1.0)
-    unit = shown.shown_unit
-    ax.set(xlabel=f"oracle [{unit}]", ylabel=f"error [{unit}]", title=f"{shown.symbol}: residuals")
+    unit = drawn(shown.shown_unit)
+    ax.set(xlabel=f"oracle [{unit}]", ylabel=f"error [{unit}]", title=f"{drawn(shown.symbol)}: residuals")
     return ax

@@ -303,3 +303,73 @@ class TestSize:
 
     def test_the_first_docstring_says_what_experiments_are(self):
         assert "not its outputs" in (ast.get_docstring(TREES["experiments"]) or "")
+
+
+EVALUATING = {"eval", "exec", "compile", "__import__", "system", "popen", "execv", "execve", "execvp", "spawnl",
+              "spawnv", "getoutput", "getstatusoutput", "unsafe_load", "full_load"}  # fmt: skip
+STATED = {
+    "re.compile",  # patterns
+    "importlib.import_module",  # names of our own modules
+}
+
+
+def dotted(node: ast.expr) -> str:
+    """``a.b.c`` of an attribute, or a name; empty for anything else."""
+    if isinstance(node, ast.Attribute):
+        above = dotted(node.value)
+        return f"{above}.{node.attr}" if above else node.attr
+    return node.id if isinstance(node, ast.Name) else ""
+
+
+def dangerous(tree: ast.AST) -> Iterator[str]:
+    """What in a module could run a text: calls, and keyword arguments that turn data into code."""
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Call):
+            continue
+        name = dotted(node.func)
+        if name.rpartition(".")[2] in EVALUATING and name not in STATED:
+            yield f"{node.lineno} {name}"
+        for word in node.keywords:
+            plain = isinstance(word.value, ast.Constant) and word.value.value is False
+            if word.arg in ("shell", "allow_pickle", "loader", "Loader") and not plain:
+                yield f"{node.lineno} {name}({word.arg})"
+        if name == "yaml.load":
+            yield f"{node.lineno} {name}"
+        starts = name in ("subprocess.run", "subprocess.Popen", "subprocess.check_output", "subprocess.call")
+        if starts and node.args and isinstance(node.args[0], (ast.Constant, ast.JoinedStr)):
+            yield f"{node.lineno} {name} of a text"
+
+
+class TestDataIsNotCode:
+    """A config, a model and a run folder are data: nothing in the three packages runs a text."""
+
+    def test_nothing_evaluates_or_unpickles(self):
+        assert {name: found for name, tree in TREES.items() if (found := list(dangerous(tree)))} == {}
+
+    def test_no_module_that_loads_code_from_data(self):
+        loading = {
+            "pickle",
+            "marshal",
+            "shelve",
+            "dill",
+            "joblib",
+            "cloudpickle",
+            "yaml",
+            "runpy",
+            "code",
+            "codeop",
+            "imp",
+        }
+        assert {name for name in FILES if {m.split(".")[0] for m in all_imports(name)} & loading} == set()
+
+    @pytest.mark.parametrize(
+        "text",
+        ["eval(x)", "builtins.exec(x)", "os.system(x)", "subprocess.run(x, shell=True)", "subprocess.run(x, shell=y)",
+         "subprocess.Popen('ls')", "subprocess.run(f'ls {x}')", "np.load(x, allow_pickle=True)", "yaml.load(x)",
+         "compile(x, '', 'exec')", "__import__(x)"],
+    )  # fmt: skip
+    def test_the_search_would_see_it(self, text):
+        assert list(dangerous(ast.parse(text)))
+
+    def test_the_search_lets_lists_and_patterns_pass(self):
+        assert list(dangerous(ast.parse("subprocess.run(['git'], shell=False)\nre.compile('x')"))) == []

@@ -1,5 +1,6 @@
 """What the documents show is run: configs resolve, code blocks execute."""
 
+import ast
 import re
 import tomllib
 from pathlib import Path
@@ -22,6 +23,41 @@ def blocks(name, language):
 @pytest.fixture
 def registry(monkeypatch):
     monkeypatch.setattr(oracles, "_REGISTERED", {})
+
+
+def named_tests(page):
+    """File, class and name of every test that a page names; ``…`` stands for what was left out."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    return re.findall(r"`(test_\w+\.py)((?:::[\w…]+)*)`", text)
+
+
+def has_test(file, parts):
+    """Whether there is such a test."""
+    (place,) = (ROOT / "tests").rglob(file)
+    tree = ast.parse(place.read_text(encoding="utf-8"))
+    found = {n.name for n in tree.body if isinstance(n, (ast.ClassDef, ast.FunctionDef))}
+    inner = {f"{c.name}::{f.name}" for c in tree.body if isinstance(c, ast.ClassDef)
+             for f in c.body if isinstance(f, ast.FunctionDef)}  # fmt: skip
+    wanted = re.escape(parts.removeprefix("::")).replace("…", ".*")
+    return not parts or any(re.fullmatch(wanted, name) for name in found | inner)
+
+
+def test_every_test_that_the_page_on_reliability_names_is_there():
+    named = named_tests("docs/reliability.md")
+    assert len(named) > 40
+    assert [f"{file}{parts}" for file, parts in named if not has_test(file, parts)] == []
+    assert not has_test("test_faults_disk.py", "::TestDiskFull::test_that_is_not_there")
+    rows = [
+        line
+        for line in (ROOT / "docs/reliability.md").read_text(encoding="utf-8").splitlines()
+        if line.startswith("| ")
+    ]
+    faults = [
+        row
+        for row in rows
+        if row.count("|") == 4 and "---" not in row and not row.startswith(("| column", "| fault", "| attack"))
+    ]
+    assert [row for row in faults if "test_" not in row] == []
 
 
 def test_readme_config_resolves():

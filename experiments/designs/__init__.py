@@ -31,6 +31,9 @@ from .properties import Properties, properties
 from .space_filling import Halton, LatinHypercube, Random, Sobol
 from .uniform import Uniform
 
+MOST_TRIED = 4096
+"""Sizes tried for one that a method allows: more than lie between two sizes of any."""
+
 METHODS: dict[str, type[DesignMethod]] = {
     cls.method: cls
     for cls in (
@@ -98,7 +101,7 @@ def get(method: str, settings: Mapping[str, Any] | None = None, at_least: float 
     # Which sizes a method allows is the method's own business: take the first that it does not refuse.
     smallest = ceil(at_least)
     refusal = None
-    for n_runs in range(smallest, 2 * smallest + 64):
+    for n_runs in range(smallest, min(2 * smallest + 64, smallest + MOST_TRIED)):
         try:
             return build(kind, cls, {**chosen, "n_runs": n_runs})
         except ValueError as error:

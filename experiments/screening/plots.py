@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..naming import drawn
 from ..runs import Response
 from .daniel import half_normal_fit
 from .judgement import Judgement
@@ -48,7 +49,8 @@ def half_normal(ax: "Axes", result: Judgement, response: Response) -> "Axes":
     ax.plot(fit.quantiles[~active], size[~active], "o", color=QUIET, ms=4)
     ax.plot(fit.quantiles[active], size[active], "o", color=ACTIVE, ms=5)
     _margin_lines(ax.axhline, result, response, 1.15 * top)
-    ax.set(xlabel="half-normal quantile", ylabel=f"|{_what(result)}| [{response.shown_unit}]", title="Half-normal")
+    ax.set(xlabel="half-normal quantile", ylabel=f"|{_what(result)}| [{drawn(response.shown_unit)}]")
+    ax.set(title="Half-normal")
     # Where nothing acts the largest are named all the same: they are what one asks for.
     named = active if active.any() else np.arange(len(size)) >= len(size) - 3
     labels = [fit.names[i] for i in np.flatnonzero(named)]
@@ -72,7 +74,7 @@ def pareto(ax: "Axes", result: Judgement, response: Response) -> "Axes":
     top = size.max(initial=0.0)
     _margin_lines(ax.axvline, result, response, top)
     more = f"; {left_out} smaller not shown" if left_out else ""
-    ax.set(xlabel=f"|{_what(result)}| [{response.shown_unit}]{more}", title="Pareto")
+    ax.set(xlabel=f"|{_what(result)}| [{drawn(response.shown_unit)}]{more}", title="Pareto")
     ax.set_xlim(0.0, top * 1.12 or 1.0)
     return ax
 
@@ -93,7 +95,7 @@ def lenth_plot(ax: "Axes", result: Judgement, response: Response) -> "Axes":
     font = tick_size(ax, len(size), "x")
     shown = at if font >= SMALLEST else np.flatnonzero(result.active)
     ax.set_xticks(shown, [result.names[i] for i in shown], rotation=90, fontsize=max(font, SMALLEST))
-    ax.set(ylabel=f"{_what(result)} [{response.shown_unit}]", title="Lenth")
+    ax.set(ylabel=f"{_what(result)} [{drawn(response.shown_unit)}]", title="Lenth")
     ax.set_ylim(-1.12 * top or -1.0, 1.12 * top or 1.0)
     return ax
 

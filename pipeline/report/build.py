@@ -5,12 +5,14 @@ from importlib.resources import files
 from typing import Any
 
 from jinja2 import Environment, StrictUndefined
+from markupsafe import Markup
 
 from experiments.designs import METHODS
 
 from ..runner import Outcome
 from . import commanded, comparing, figures, growing, holes, validation, views
 
+SPACES = "\n\u00a0\u2009\u202f"
 _HERE = files("pipeline.report")
 
 
@@ -28,7 +30,8 @@ def report_html(outcome: Outcome, provenance: Mapping[str, Any]) -> str:
 
 def rendered(template: str, content: Mapping[str, Any]) -> str:
     """A template of this folder with its content; `style` is ours."""
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+                              finalize=_readable)  # fmt: skip
     return environment.from_string(_read(template)).render({"style": _read("style.css"), **content})
 
 
@@ -82,6 +85,13 @@ def _content(outcome: Outcome, provenance: Mapping[str, Any]) -> dict[str, Any]:
         "prefix": outcome.study.export_prefix,
         "exported": outcome.exported,
     }
+
+
+def _readable(value: Any) -> Any:
+    """A text without what cannot be printed: escapes for terminals, and marks that turn the reading order."""
+    if not isinstance(value, str) or isinstance(value, Markup) or value.isprintable():
+        return value
+    return "".join(c if c.isprintable() or c in SPACES else " " for c in value)
 
 
 def _read(name: str) -> str:

@@ -14,6 +14,7 @@ from typing import Any
 from experiments.naming import suggestion
 from experiments.settings import build
 
+from ..model import Surrogate
 from .base import Target
 from .c99 import C99, C99Float
 from .fmi import FMI2, FMI3
@@ -28,8 +29,21 @@ TARGETS: dict[str, type[Target]] = {
 
 __all__ = [
     "C99", "FMI2", "FMI3", "ONNX", "TARGETS", "C99Float", "CasADi", "Matlab", "NumPyFile", "StructuredText", "Target",
-    "get",
+    "check_size", "get",
 ]  # fmt: skip
+
+MOST_ENTRIES = 10_000
+"""Factors times responses of a model that is written as code: the inverse of 100 by 100 is 12 MB of C, written out."""
+
+
+def check_size(model: Surrogate) -> None:
+    """``ValueError`` if the code of a model would fill the memory: elimination, written out, grows with the cube."""
+    n, m = len(model.factors), len(model.responses)
+    if n * m > MOST_ENTRIES:
+        raise ValueError(
+            f"a model of {n} factors and {m} responses is too large to be written as code; at most {MOST_ENTRIES} "
+            "pairs of a factor and a response are"
+        )
 
 
 def get(name: str, settings: Mapping[str, Any] | None = None) -> Target:

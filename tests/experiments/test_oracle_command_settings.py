@@ -194,7 +194,12 @@ class TestPaths:
         assert once(made(tmp_path, script, responses=responses))[2] == 7.0
 
     @pytest.mark.parametrize(
-        ("make", "said"), [("os.mkfifo('r')", "is no plain file"), ("os.mkdir('r')", "no plain file")]
+        ("make", "said"),
+        [
+            ("os.mkfifo('r')", "is no plain file"),
+            ("os.mkdir('r')", "no plain file"),
+            ("open('r', 'wb').truncate(10 * 2**30)", "has 10737418240 bytes; at most"),
+        ],
     )
     def test_a_pipe_does_not_block_and_a_folder_is_no_file(self, make, said, tmp_path):
         responses = {"y": {"unit": "m", "file": "r", "regex": r"(\d+)"}}

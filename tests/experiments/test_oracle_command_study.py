@@ -16,7 +16,7 @@ import pipeline.runner
 from experiments import oracles
 from pipeline.cli import main
 from pipeline.config import dump_config, parse_config
-from pipeline.study import ready
+from pipeline.resolving import ready
 
 PAGE = (Path(__file__).parents[2] / "docs" / "command-oracle.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)

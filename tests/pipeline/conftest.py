@@ -10,6 +10,9 @@ import pipeline.runner
 from experiments import oracles
 from tests.pipeline import cases
 from tests.pipeline.cases import CONFIGS, SMALL
+from tests.pipeline.faults import finished, run, server, whole
+
+__all__ = ["finished", "run", "server", "whole"]
 
 
 @pytest.fixture(scope="session")

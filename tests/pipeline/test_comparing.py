@@ -16,9 +16,9 @@ from experiments.shells import Sheet
 from pipeline import InputError, read_run, runner
 from pipeline.config import dump_config, load_config, parse_config
 from pipeline.report import figures
+from pipeline.resolving import resolve
 from pipeline.stages import provenance
 from pipeline.store import RunFolder
-from pipeline.study import resolve
 from surrogates import dumps, load
 from tests.pipeline import cases
 from tests.pipeline.cases import SMALL, config_text, contents, reproducible

@@ -300,7 +300,7 @@ def test_settings_that_do_not_go_together(executor, sentence, tmp_path):
 
 
 def test_a_missing_package_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr("pipeline.study.find_spec", lambda name: None)
+    monkeypatch.setattr("pipeline.resolving.find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"needs the package distributed; install flexdoce\[dask\]"):
         resolve(load_config(written(tmp_path, 'name = "dask"')))
 

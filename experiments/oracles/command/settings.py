@@ -17,6 +17,9 @@ FOLDER, PYTHON = "folder", "python"
 WORDS = (FOLDER, PYTHON)
 """What argv may name beside factors: the working folder, and the Python that runs flexdoce."""
 
+MOST, LONGEST_ARGV = 1000, 128 * 2**10
+"""Factors, responses or files of a program; characters of all its arguments (a single one on Linux)."""
+
 KEEP = ("failed", "all", "none")
 _RESPONSE_KEYS = ("unit", "shown_unit", "shown_scale", "symbol")
 
@@ -41,7 +44,8 @@ class Program:
     source: str = parameter("", "", "where the physics comes from")
 
     def __post_init__(self) -> None:
-        checks.texts("argv", self.argv)
+        if sum(map(len, checks.texts("argv", self.argv))) > LONGEST_ARGV:
+            raise ValueError(f"argv is longer than {LONGEST_ARGV} characters, which no system passes to a program")
         if not self.argv or not self.argv[0]:
             raise ValueError("argv needs the program and its arguments, as a list of texts")
         first = self.argv[0]
@@ -108,6 +112,8 @@ def settings_from(kind: str, given: Mapping[str, Any]) -> Settings:
     """
     given = copy.deepcopy(dict(given))
     tables = {name: _table(kind, name, given.get(name, {})) for name in ("factors", "responses", "templates", "files")}
+    if large := [name for name, table in tables.items() if len(table) > MOST]:
+        raise ValueError(f"{kind}: {len(tables[large[0]])} {large[0]} are too many; at most {MOST} are allowed")
     program = build(kind, Program, {k: v for k, v in given.items() if k not in tables})
     space = FactorSpace(tuple(_factor(kind, name, table) for name, table in tables["factors"].items()))
     found = [_response(kind, name, table) for name, table in tables["responses"].items()]

@@ -11,6 +11,7 @@ from ...naming import suggestion
 from .units import convert, ratio
 
 OPEN = "{{"
+MOST_PLACEHOLDERS = 50_000
 _PLACEHOLDER = re.compile(
     r"\{\{[ ]*([A-Za-z][A-Za-z0-9_]*)[ ]*(?:\[([^\[\]{}\n]{1,40})\])?[ ]*(?::([^{}\n]{0,20}))?\}\}"
 )
@@ -87,6 +88,8 @@ class Template:
         end = 0
         for match in _PLACEHOLDER.finditer(text):
             pieces.append(_literal(what, text, end, match.start()))
+            if len(pieces) > 2 * MOST_PLACEHOLDERS:
+                raise ValueError(f"{what} has more than {MOST_PLACEHOLDERS} placeholders")
             try:
                 pieces.append(_placeholder(*match.groups(), space=space, words=words))
             except ValueError as error:
