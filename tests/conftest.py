@@ -1,6 +1,5 @@
 """Equal programs are compiled once in a session: most of the time of the nonlinear oracles' tests is compilation."""
 
-import importlib.metadata
 import os
 import shutil
 import tempfile
@@ -27,17 +26,8 @@ LONGEST = (
 """Files that take most of a minute, in the order in which they begin: what compiles goes before what then finds it."""
 
 
-QUICK, TRIED = "--xla_cpu_use_fusion_emitters=false", "0.10."
-"""XLA's older generator of loops compiles in 60 to 80 % of the time. Unknown flags end a process: hence the version.
-
-That what users compile gives the same is asked in experiments/test_fea_nonlinear.py.
-"""
-
-
 def pytest_configure(config: pytest.Config) -> None:
     """Before JAX is imported. A folder that the user named is taken, and kept; ours is removed at the end."""
-    if importlib.metadata.version("jaxlib").startswith(TRIED):
-        os.environ.setdefault("XLA_FLAGS", QUICK)
     if FOLDER not in os.environ:
         ours = tempfile.mkdtemp(prefix="flexdoce-compiled-")
         os.environ[FOLDER] = ours
