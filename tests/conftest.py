@@ -15,7 +15,7 @@ LONGEST = (
     "experiments/test_oracle_flexure_3rrr.py",
     "experiments/test_fea_geometry.py",
     "validation/test_fea_nonlinear_frames.py",
-    "validation/test_fea_nonlinear_paths.py",
+    "validation/test_fea_nonlinear_stability.py",
     "test_configs.py",
     "test_docs.py",
     "surrogates/exports/test_c99_tools.py",

@@ -5,6 +5,7 @@ import io
 import re
 import zipfile
 from dataclasses import replace
+from functools import cache
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -24,10 +25,12 @@ NAMES = st.lists(
     st.sampled_from(["int", "end", "IF", "lambda", "if_", "x0", "v1", "m0_1", "coded", "status", "NaN", "True", "class",
                      "sum", "exp", "function", "VAR", "real", "LREAL", "None", "time", "a", "A"]),
     min_size=4, max_size=4, unique=True,
-)  # fmt: skip
+).map(tuple)  # fmt: skip
 
 
-def model(text: str, names: list[str]) -> Surrogate:
+@cache
+def model(text: str, names: tuple[str, ...]) -> Surrogate:
+    """Once for all targets, which are asked the same: most of the time is its certificate."""
     unit = "m"
     for letter in text:  # what a unit may hold is checked when it is made: as much of the text as it takes
         try:
