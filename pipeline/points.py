@@ -202,7 +202,7 @@ class PointStore:
                     found[row.key] = (row, answer)
         except sqlite3.DatabaseError as error:
             raise database.translated(error, self.path) from None
-        except (ValueError, TypeError) as error:
+        except (ValueError, TypeError, RecursionError) as error:
             raise InputError(f"the point store {self.path} is damaged ({error}); move it away or use --fresh") from None
         return found
 
