@@ -6,12 +6,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from experiments import Factor, FactorSpace, Response, oracles
+from experiments import Factor, FactorSpace, Response
 from experiments.oracles import PointOracle
 from experiments.settings import parameter
 
 
-@oracles.register
 @dataclass(frozen=True)
 class Pausing(PointOracle):
     """Six factors, six responses, and a pause."""

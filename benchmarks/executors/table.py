@@ -21,6 +21,7 @@ from pipeline.executors import execute
 from pipeline.points import PointStore
 
 from . import pausing
+from .overheads import PAUSING, overheads
 
 POINTS = {0.0: 500, 0.01: 500, 1.0: 20}
 """Points by pause [s]."""
@@ -35,18 +36,15 @@ class Case(NamedTuple):
 
 
 def ours(executor: str, pause: float, design: Design) -> tuple[float, float]:
-    config = parse_config(f'name = "b"\n[oracle]\nname = "pausing"\n[executor]\n{executor}')
-    config = config.model_copy(
-        update={"oracle": config.oracle.model_copy(update={"parameters": {"pause": pause}})}
-    )  # a pause of 1e-05 is no TOML that everybody writes alike
-    oracle = oracles.get("pausing", pause=pause)
+    config = parse_config(f'name = "b"\n[oracle]\nname = "cantilever"\n[executor]\n{executor}')
+    oracle = oracles.get(PAUSING, pause=pause)
     few = design.take(np.arange(4))
     rest = design.take(np.arange(4, len(design)))
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         with (
             PointStore(place / "points.sqlite", oracle) as store,
-            executors.make(config, oracle, place / "work", print) as executor_,
+            executors.make(config, oracle, print) as executor_,
         ):
             return timed(lambda d: execute(oracle, d, store, "fit", executor=executor_), few, rest)
 
@@ -101,7 +99,7 @@ CASES = (
 
 
 def table() -> str:
-    space = oracles.get("pausing").factors
+    space = oracles.get(PAUSING).factors
     rows, starts = {case: [] for case in CASES}, {}
     for pause, n in POINTS.items():
         design = Random(n_runs=n + 4).generate(space, rng=1)
@@ -115,7 +113,8 @@ def table() -> str:
     return (
         f"### Executors\n\nA point that only waits; {packages}. Wall time per point, and how much of the workers' time "
         "went into the pauses. Ours store every point durably, the peers nothing.\n\n"
-        f"| executor | workers | start, 4 points [s] |{head}\n|---|---|---|{'---|' * len(POINTS)}\n{body}"
+        f"| executor | workers | start, 4 points [s] |{head}\n|---|---|---|{'---|' * len(POINTS)}\n{body}\n"
+        + overheads()
     )
 
 

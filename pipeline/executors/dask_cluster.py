@@ -173,8 +173,7 @@ class DaskCluster(Executor):
 
         try:
             if self.address is None:
-                with worker.uninterrupted():
-                    self._cluster = LocalCluster(n_workers=self.workers, **LOCAL)
+                self._cluster = LocalCluster(n_workers=self.workers, **LOCAL)
             is_file = self.address is not None and self.address.endswith(".json")
             where: Any = {"scheduler_file" if is_file else "address": self._cluster or self.address}
             self._client = Client(**where, timeout=PATIENCE, set_as_default=False)
@@ -185,7 +184,8 @@ class DaskCluster(Executor):
                 "scheduler, or leave the address out to have one started here"
             ) from None
         self._seen = time.monotonic()
-        self._client.register_plugin(OraclePlugin(self.recipe), name=self.recipe.token)
+        plugin = OraclePlugin(self.recipe, is_ours=self.address is None)
+        self._client.register_plugin(plugin, name=self.recipe.token)
         return self._client
 
     @property

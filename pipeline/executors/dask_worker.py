@@ -1,5 +1,7 @@
 """What a Dask worker is given: the study's oracle, which every one makes for itself, also one that comes later."""
 
+import signal
+import threading
 from typing import Any
 
 from distributed import WorkerPlugin
@@ -13,13 +15,17 @@ class OraclePlugin(WorkerPlugin):
     Parameters
     ----------
     recipe : Recipe
+    is_ours : bool
+        Whether the worker was started for this study: Ctrl-C in its terminal is then not its own affair.
     """
 
-    def __init__(self, recipe: Recipe) -> None:
-        self.recipe = recipe
+    def __init__(self, recipe: Recipe, is_ours: bool) -> None:
+        self.recipe, self.is_ours = recipe, is_ours
 
     def setup(self, worker: Any) -> None:
         """On every worker, before it has any task."""
+        if self.is_ours and threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
         prepare(self.recipe)
 
     def teardown(self, worker: Any) -> None:
