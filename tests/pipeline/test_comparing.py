@@ -57,7 +57,7 @@ def changed(folder, text: str) -> None:
 def report(outcome, monkeypatch) -> None:
     """Write the report after all, without its figures, which take most of the time."""
     monkeypatch.undo()
-    monkeypatch.setattr(figures, "_uri", lambda draw, size: "data:,")
+    monkeypatch.setattr(figures, "uri", lambda draw, size: "data:,")
     runner.write_report(RunFolder(outcome.path), outcome)
 
 

@@ -127,7 +127,7 @@ class TestMembers:
         assert [row.code for row in found.rows] == [0, 4, 0, 4, 3, 3]
         assert "1e-09" in found.rows[1].reason
         assert "it broke" not in found.rows[0].reason
-        assert "screening needs every run" in found.rows[4].reason
+        assert "screening: 8 of 8 runs failed" in found.rows[4].reason
         assert found.code == 3
         assert found.trouble.startswith("4 of 6 members: stiffness=1,max_relative_error=1e-09 (falls short), ")
 
@@ -199,7 +199,7 @@ class TestPage:
         assert links == set(names(found)[:4])
         assert text.count("data:image/svg+xml;base64,") == 2
         assert "2 of the members came to no model" in text
-        assert "screening needs every run" in text
+        assert "screening: 8 of 8 runs failed" in text
 
     def test_hostile_texts_are_quoted(self, config, tmp_path, monkeypatch):
         monkeypatch.undo()
@@ -332,7 +332,7 @@ class TestCommand:
         assert main([*argv, "--cache", str(tmp_path / "answers")]) == 3
         told, warned = capsys.readouterr()
         assert "1 of 2  stiffness=1\n" in told
-        assert "too many failures: screening needs every run" in told
+        assert "too many failures: screening: 8 of 8 runs failed" in told
         assert "certified" in told
         assert warned.splitlines()[-1].startswith("flexdoce: 1 of 2 members: stiffness=-1 (too many failures)")
         assert (tmp_path / "answers" / "points.sqlite").is_file()

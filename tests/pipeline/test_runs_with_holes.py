@@ -41,7 +41,7 @@ def twins(numbers) -> set[int]:
 @pytest.fixture
 def study(counted, tmp_path, monkeypatch):
     """Run the counted oracle's study in folder `name`; its report has words and no pictures, which take the time."""
-    monkeypatch.setattr(pipeline.report.figures, "_uri", lambda draw, size: "data:image/svg+xml;base64,")
+    monkeypatch.setattr(pipeline.report.figures, "uri", lambda draw, size: "data:image/svg+xml;base64,")
     config = tmp_path / "study.toml"
     config.write_text(config_text(), encoding="utf-8")
     design = pipeline.resolve(pipeline.load_config(config)).screening_design
