@@ -18,7 +18,7 @@ PAUSING = f"{pausing.__file__}:Pausing"
 
 ECHO: dict[str, Any] = {
     "argv": ["echo", "y = {{a}}"],
-    "templates": {"input.txt": {"text": "a = {{a:.6e}}\nb = {{b:.6e}}\n"}},
+    "templates": {"input.txt": {"text": "a = {{a:.6e}}\nb = {{b:.6e}}\nc = {{c:.6e}}\n"}},
     "factors": {name: {"unit": "N", "low": 0.0, "high": 1.0} for name in "abc"},
     "responses": {"y": {"unit": "m", "regex": r"y = (\S+)"}},
 }

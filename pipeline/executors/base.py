@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from experiments.oracles import Answers
 from experiments.runs import Status
 
+from .worker import Recipe
+
 MOST_LOSSES = 3
 """Workers that a point may lose before it is taken to be what ends them."""
 
@@ -81,6 +83,30 @@ class Executor(ABC):
 
     def close(self, in_haste: bool) -> None:  # noqa: B027 - in the same process there is nothing to close
         """End what was started; `in_haste`, without waiting for answers."""
+
+
+class Elsewhere(Executor):
+    """An executor whose workers are other processes.
+
+    Parameters
+    ----------
+    recipe : Recipe
+    batch : int or None
+        Points per batch; as many as the oracle answers together, if None.
+    note : callable
+        Told in a sentence what is worth a line in the log.
+    """
+
+    def __init__(self, recipe: Recipe, batch: int | None, note: Callable[[str], None]) -> None:
+        self.recipe, self.batch, self.note = recipe, batch, note
+        self._backlog = self._waiting(())
+
+    def size(self, batch: int) -> int:
+        """As set, or as the oracle has it."""
+        return self.batch or batch
+
+    def _waiting(self, batches: Iterable[Batch]) -> "Backlog":
+        return Backlog(batches, self.recipe.n_responses, self.note)
 
 
 class Backlog:

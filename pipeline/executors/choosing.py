@@ -37,5 +37,5 @@ def make(config: Config, oracle: Oracle, note: Callable[[str], None]) -> Executo
     recipe = Recipe(f"flexdoce-{uuid4().hex}", oracles.recipe(oracle).make, identity(oracle), len(oracle.responses))
     workers = table.workers or cores()
     if table.name == "processes":
-        return Processes(recipe, workers, table.batch, note)
-    return DaskCluster(recipe, table.address, workers, table.batch, note)
+        return Processes(recipe, table.batch, note, workers)
+    return DaskCluster(recipe, table.batch, note, table.address, workers)

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..errors import FlexdoceError, InputError
 from . import worker
-from .base import Answered, Backlog, Batch, Executor
+from .base import Answered, Batch, Elsewhere
 from .worker import Recipe
 
 LEAST_AHEAD, MOST_AHEAD, HORIZON = 2, 50, 0.2
@@ -29,42 +29,35 @@ LOCAL: dict[str, Any] = {
 """Of a cluster that is started here: an oracle need not bear threads, and no worker is ended for its memory."""
 
 
-class DaskCluster(Executor):
+class DaskCluster(Elsewhere):
     """A Dask cluster, joined or begun when the first point asks for it.
 
     Parameters
     ----------
-    recipe : Recipe
+    recipe, batch, note
+        As :class:`.Elsewhere` has them.
     address : str or None
         Of the scheduler, such as ``tcp://head:8786``, or the path of its file, which ends in ``.json``. With None a
         cluster is started here.
     workers : int
         Of a cluster that is started here.
-    batch : int or None
-        Points per task; as many as the oracle answers together, if None.
-    note : callable
-        Told in a sentence what is worth a line in the log.
     """
 
     def __init__(
-        self, recipe: Recipe, address: str | None, workers: int, batch: int | None, note: Callable[[str], None]
+        self, recipe: Recipe, batch: int | None, note: Callable[[str], None], address: str | None, workers: int
     ) -> None:
-        self.recipe, self.address, self.workers, self.batch, self.note = recipe, address, workers, batch, note
+        super().__init__(recipe, batch, note)
+        self.address, self.workers = address, workers
         self._client: Any = None
         self._cluster: Any = None
         self._given: dict[Any, Batch] = {}
         self._done: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._backlog = Backlog((), recipe.n_responses, note)
         self._threads, self._looked, self._seen = 0, 0.0, 0.0
         self._ahead = LEAST_AHEAD
 
-    def size(self, batch: int) -> int:
-        """As set, or as the oracle has it."""
-        return self.batch or batch
-
     def run(self, batches: Iterable[Batch]) -> Iterator[Sequence[Answered]]:
         """Keep the workers busy, those that join, too."""
-        self._backlog = Backlog(batches, self.recipe.n_responses, self.note)
+        self._backlog = self._waiting(batches)
         while True:
             self._fill()
             found = self.arrived()

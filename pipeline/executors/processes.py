@@ -11,7 +11,7 @@ from multiprocessing import get_context
 
 from ..errors import InputError
 from . import worker
-from .base import Answered, Backlog, Batch, Executor
+from .base import Answered, Batch, Elsewhere
 from .worker import Recipe
 
 AHEAD = 2
@@ -21,31 +21,24 @@ ENDED = (BrokenProcessPool, SystemExit)
 """What a future says whose worker was killed, or told to end."""
 
 
-class Processes(Executor):
+class Processes(Elsewhere):
     """A pool of worker processes, begun when the first point asks for it.
 
     Parameters
     ----------
-    recipe : Recipe
+    recipe, batch, note
+        As :class:`.Elsewhere` has them.
     workers : int
-    batch : int or None
-        Points per batch; as many as the oracle answers together, if None.
-    note : callable
-        Told in a sentence what is worth a line in the log.
     """
 
-    def __init__(self, recipe: Recipe, workers: int, batch: int | None, note: Callable[[str], None]) -> None:
-        self.recipe, self.workers, self.batch, self.note = recipe, workers, batch, note
+    def __init__(self, recipe: Recipe, batch: int | None, note: Callable[[str], None], workers: int) -> None:
+        super().__init__(recipe, batch, note)
+        self.workers = workers
         self._slots: list[_Slot] = []
-        self._backlog = Backlog((), recipe.n_responses, note)
-
-    def size(self, batch: int) -> int:
-        """As set, or as the oracle has it."""
-        return self.batch or batch
 
     def run(self, batches: Iterable[Batch]) -> Iterator[Sequence[Answered]]:
         """Keep every worker busy; what is given was answered in the order of its coming in."""
-        self._backlog = Backlog(batches, self.recipe.n_responses, self.note)
+        self._backlog = self._waiting(batches)
         while True:
             self._fill()
             going = [future for slot in self._slots for future, _ in slot.given]

@@ -214,6 +214,14 @@ class TestFolders:
         assert len(folders_in(tmp_path)) == 1
         assert oracle.working_in(tmp_path / "other").settings.program.work_folder == str(tmp_path / "work")
 
+    def test_a_machine_may_have_a_place_of_its_own(self, tmp_path, monkeypatch):
+        """And the reason then names all of it, for nobody would look there."""
+        monkeypatch.setenv("FLEXDOCE_WORK", str(tmp_path / "scratch"))
+        _, reason, _ = once(made(tmp_path, "sys.exit(1)", keep="failed"))
+        (folder,) = (tmp_path / "scratch").iterdir()
+        assert reason.endswith(f"(folder {folder})")
+        assert not (tmp_path / "work").exists()
+
     def test_the_folder_is_named_by_settings_and_point(self, tmp_path):
         for oracle, point in (
             (made(tmp_path), (1.0, 0.0)), (made(tmp_path), (1.0, -0.0)), (made(tmp_path), (1.0, 0.1)),

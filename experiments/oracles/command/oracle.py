@@ -28,6 +28,9 @@ LAST_LINES, LONGEST_LINE = 20, 200
 
 KIND = "oracle 'command'"
 
+PLACE = "FLEXDOCE_WORK"
+"""Environment variable: where working folders are made on this machine, such as a disk of its own."""
+
 _AGAIN = {Status.CRASHED, Status.TIMED_OUT}
 _NOT_ANSWERS = ("time_limit", "grace", "retries", "keep", "work_folder", "inherit", "source", "resolution")
 """Settings that change no answer: points that were answered stay good when they change."""
@@ -111,6 +114,11 @@ class CommandOracle(Oracle):
         )
 
     @property
+    def _place(self) -> str | None:
+        """Where working folders are made; None for a temporary place."""
+        return os.environ.get(PLACE) or self.settings.program.work_folder
+
+    @property
     def missing(self) -> str:
         """Why no point can be run on this machine, with what to do; empty if the program is there."""
         name = sys.executable if self.settings.program.argv[0] == "{{python}}" else self.settings.program.argv[0]
@@ -134,7 +142,7 @@ class CommandOracle(Oracle):
     def openly(self, point: Sequence[float]) -> list[str]:
         """What would be run and written at `point`, shape (n_factors,), a line each; nothing is."""
         program, settings = self.settings.program, self.settings
-        folder = f"{program.work_folder or '(a temporary place)'}/{self._folder_name(tuple(point))}-1"
+        folder = f"{self._place or '(a temporary place)'}/{self._folder_name(tuple(point))}-1"
         argv = self._argv(point, folder)
         passed = [n for n in (*process.INHERITED, *program.inherit) if n in os.environ]
         lines = [
@@ -174,7 +182,7 @@ class CommandOracle(Oracle):
     def _try(self, point: tuple[float, ...]) -> Verdict:
         program = self.settings.program
         try:
-            folder = WorkFolder.make(program.work_folder, self._folder_name(point))
+            folder = WorkFolder.make(self._place, self._folder_name(point))
         except OSError as error:
             return Verdict(Status.CRASHED, f"no working folder can be made: {error}")
         good = False
@@ -186,7 +194,8 @@ class CommandOracle(Oracle):
             if not kept:
                 folder.remove()
         if kept and not good:
-            where = folder.path if program.work_folder is None else folder.path.name
+            is_known = self._place is not None and self._place == program.work_folder
+            where = folder.path.name if is_known else folder.path
             verdict = verdict._replace(reason=f"{verdict.reason} (folder {where})")
         return verdict
 
