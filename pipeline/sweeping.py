@@ -12,7 +12,6 @@ from experiments import oracles, settings
 from experiments.runs import Status
 
 from . import stages
-from .comparison import Found, Row, frame
 from .config import Config, load_config
 from .errors import FlexdoceError, InputError, TooManyFailures
 from .executors import Progress, silent
@@ -23,6 +22,7 @@ from .runner import run
 from .status import read_status, stored
 from .store import CACHE, PAGE, TABLE, WORK, RunFolder, SweepFolder
 from .study import STAGES, Study
+from .sweep_rows import Found, Row, frame
 from .tables import sweep_csv
 from .tally import Tally, Watcher
 

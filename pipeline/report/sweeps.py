@@ -8,9 +8,9 @@ from urllib.parse import quote
 from experiments.runs import Response
 from surrogates import Verdict
 
-from ..comparison import Found, Row, ratio
 from ..config import dump_config
 from ..grid import shown
+from ..sweep_rows import Found, Row, ratio
 from ..sweeping import Sweep
 from .build import rendered
 from .commanded import DIGITS, inwards

@@ -19,8 +19,8 @@ from experiments.oracles import PointOracle
 from experiments.settings import parameter
 from pipeline import InputError
 from pipeline.cli import main
-from pipeline.comparison import ratio
 from pipeline.lock import FolderLock
+from pipeline.sweep_rows import ratio
 from surrogates import load
 from tests.pipeline.cases import CONFIGS, contents, reproducible
 
