@@ -28,7 +28,7 @@ from .signals import ended_like_ctrl_c
 from .status import Standing, read_status
 from .store import RunFolder, SweepFolder
 from .sweep_console import Bars, print_plan, sweep_summary
-from .sweeping import Progressing, planned, read_sweep_status
+from .sweeping import SweepStanding, planned, read_sweep_status
 from .sweeping import sweep as run_sweep
 
 WATCH_EVERY = 2.0
@@ -151,7 +151,7 @@ def status(arguments: Namespace) -> None:
         pass  # the watching ends, not the run
 
 
-def _standing(path: Path) -> Standing | Progressing:
+def _standing(path: Path) -> Standing | SweepStanding:
     if SweepFolder.is_at(path):
         return read_sweep_status(path)
     return read_status(RunFolder.existing(path)[0])

@@ -11,9 +11,9 @@ from pydantic import BaseModel, BeforeValidator, Field, PrivateAttr, ValidationE
 from experiments.naming import suggestion
 from experiments.oracles.files import is_file
 
-from .comparing import CompareTable, with_models
 from .errors import InputError
 from .nesting import DEEPEST, excess
+from .other_models import CompareTable, with_models
 from .programs import embedded
 from .sections import (
     CommandTable,

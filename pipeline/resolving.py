@@ -20,10 +20,10 @@ from surrogates import Surrogate, commanding, exports
 from surrogates.candidates import AUTO
 from surrogates.choosing import TAUGHT, Choice, natural_basis
 
-from .comparing import compared_models
 from .config import Config
 from .errors import InputError
 from .oracle_file import Code, code_of, recorded, unchanged
+from .other_models import compared_models
 from .study import SEQUENCES, Study, stage_seed
 
 T = TypeVar("T")
@@ -136,12 +136,13 @@ def ready(study: Study, place: Path) -> Study:
     Raises
     ------
     InputError
-        If the program is not on this machine: better now than as so many failed points.
+        If the program is not on this machine, and is to be run here: better now than as so many failed points. The
+        workers of somebody's cluster look for themselves.
     """
     oracle: Any = study.oracle
     if not hasattr(oracle, "working_in"):
         return study
-    if oracle.missing:
+    if oracle.missing and study.config.executor.address is None:
         raise InputError(f"oracle.command: {oracle.missing}")
     return replace(study, oracle=oracle.working_in(place))
 

@@ -7,11 +7,11 @@ from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
-from .comparison import Row
 from .console import console, progress_bars
 from .executors import Progress
 from .grid import Axis, Member, shown
 from .store import PAGE, TABLE
+from .sweep_rows import Row
 from .sweeping import Planned, Sweep, Watch
 
 

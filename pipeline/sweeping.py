@@ -12,7 +12,6 @@ from experiments import oracles, settings
 from experiments.runs import Status
 
 from . import stages
-from .comparison import Found, Row, frame
 from .config import Config, load_config
 from .errors import FlexdoceError, InputError, TooManyFailures
 from .executors import Progress, silent
@@ -23,6 +22,7 @@ from .runner import run
 from .status import read_status, stored
 from .store import CACHE, PAGE, TABLE, WORK, RunFolder, SweepFolder
 from .study import STAGES, Study
+from .sweep_rows import Found, Row, frame
 from .tables import sweep_csv
 from .tally import Tally, Watcher
 
@@ -302,7 +302,7 @@ def _unit(key: str, study: Study) -> str:
 
 
 @dataclass(frozen=True)
-class Progressing:
+class SweepStanding:
     """Where a sweep is; reads like a run's :class:`.Standing`.
 
     Parameters
@@ -325,7 +325,7 @@ class Progressing:
         return [f"{head}, {len(self.told)} members", *self.told, *([f"Page: {page}"] if page.is_file() else [])]
 
 
-def read_sweep_status(path: Path) -> Progressing:
+def read_sweep_status(path: Path) -> SweepStanding:
     """Where each member of a sweep is; changes nothing."""
     owner = holder(path)
     _, config = SweepFolder.existing(path)
@@ -338,4 +338,4 @@ def read_sweep_status(path: Path) -> Progressing:
         standing = read_status(RunFolder(place))
         at = f", {standing.state.place}" if standing.owner and standing.state and standing.state.stage else ""
         told.append(f"{standing.headline}{at}")
-    return Progressing(path, owner, tuple(told))
+    return SweepStanding(path, owner, tuple(told))

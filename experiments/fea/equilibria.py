@@ -164,6 +164,8 @@ class Path:
         Points at which the load has an extremum along the path.
     ended : str
         Why the path ended.
+    missed : tuple of str
+        Limit points that were passed and not found: between which levels, and why.
     """
 
     level: Floats
@@ -171,6 +173,7 @@ class Path:
     equilibria: Equilibria
     is_limit: NDArray[np.bool_]
     ended: str
+    missed: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.level)

@@ -226,14 +226,14 @@ class NonlinearSolver:
         if len(given[0]) != 1:
             raise ValueError(f"a path is that of one case, got {len(given[0])}: follow them one by one")
         problem, centre = self.problem(*given)
-        points, why = Follower(step, most, levels).follow(self.kernel.topology, problem)
+        points, why, missed = Follower(step, most, levels).follow(self.kernel.topology, problem)
         worth, iterations = gathered(points)
         true = np.ones(len(points), dtype=bool)
         level = np.array([point.level for point in points])
         settled = Settled(worth, true, level, worth.residual, worth.astray, worth.unstable, iterations)
         found = equilibria(self._described(None), settled, centre, False)
         arc = np.array([point.arc for point in points])
-        return Path(level, arc, found, np.array([point.is_limit for point in points]), why)
+        return Path(level, arc, found, np.array([point.is_limit for point in points]), why, tuple(missed))
 
     def _described(self, coordinates: Any) -> Described:
         own = self.arrays.coordinates.T[..., None] if coordinates is None else np.asarray(coordinates)

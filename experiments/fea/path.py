@@ -2,7 +2,7 @@
 
 The step is a length in the space of the motions of the bodies; the fraction of the load is an unknown
 like the others. The corrections are normal to the predictor, and the step is halved where they do not
-contract. Where the load has an extremum along the path the point is found by secants.
+contract. Where the load has an extremum along the path the point is found by secants; if it is not, that is told.
 
 Sources: Riks, Int. J. Solids Structures 15 (1979), 529–551; Ramm, in Nonlinear Finite Element Analysis
 in Structural Mechanics (1981), 63–89 (the normal that is used).
@@ -91,10 +91,14 @@ class Follower:
         if not self.levels[0] <= 0 < self.levels[1]:
             raise ValueError(f"levels must enclose 0, where the path starts, got {self.levels}")
 
-    def follow(self, topology: Topology, problem: Problem) -> tuple[list[PathPoint], str]:
-        """Points of the path from rest, and why it ended; `problem` is of one point."""
+    def follow(self, topology: Topology, problem: Problem) -> tuple[list[PathPoint], str, list[str]]:
+        """Points of the path from rest, why it ended, and the limit points passed that were not found.
+
+        `problem` is of one point.
+        """
         walk = _Walk(topology, problem)
         points, step, heading, why = [walk.rest()], self.step, None, ""
+        missed: list[str] = []
         while len(points) <= self.most:
             found, ease, direction = walk.advance(points[-1], step, heading)
             if found is None:
@@ -103,16 +107,19 @@ class Follower:
                     why = "the corrections do not contract however short the step is: a bifurcation, or a loose mode"
                     break
                 continue
-            if points[-1].slope * found.slope < 0 and len(points) > 1:
+            if points[-1].slope * found.slope < 0:
                 limit = walk.limit(points[-1], found, heading)
                 points.extend([limit] if limit else [])
+                if limit is None:
+                    between = f"between the levels {points[-1].level:.6g} and {found.level:.6g}"
+                    missed.append(f"{between} the load has an extremum: the corrections do not contract near it")
             points.append(found)
             heading = direction
             step = min(step * (1.5 if ease else 1.0), self.step)
             if not self.levels[0] <= found.level <= self.levels[1]:
                 why = f"the level {found.level:.6g} is outside {self.levels}"
                 break
-        return points, why or f"{self.most} points were found"
+        return points, why or f"{self.most} points were found", missed
 
 
 class _Walk:
@@ -153,9 +160,9 @@ class _Walk:
             state, level, before = self._moved(state, taken, jnp.array([1.0, rise])), level + rise, size
             if size < SMALL:
                 point = self._arrived(state, level, base.arc + step, tries, normal)
-                if point.conclusion.residual[0] > EXACT:
-                    break
-                return point, tries <= 3 or first < EASE, normal
+                # Near a limit point corrections at its level lead away: what is missing is corrected along the path.
+                if point.conclusion.residual[0] <= EXACT:
+                    return point, tries <= 3 or first < EASE, normal
         return None, False, None
 
     def _arrived(self, state: State, level: float, arc: float, tries: int, normal: Array) -> PathPoint:
@@ -178,19 +185,25 @@ class _Walk:
         return PathPoint(state, level, arc, slope, jax.tree.map(np.asarray, worth), tries, False)
 
     def limit(self, before: PathPoint, after: PathPoint, heading: Array | None) -> PathPoint | None:
-        """The limit point between two points, by secants with the sides kept (Illinois)."""
+        """The limit point between two points, by secants with the sides kept (Illinois); None if it is not found.
+
+        Where a step fails the next one halves the bracket.
+        """
         low, high = 0.0, after.arc - before.arc
         slope_low, slope_high = before.slope, after.slope
         scale = max(abs(slope_low), abs(slope_high))
-        best, kept = None, 0
+        failed, kept = False, 0
         for _ in range(40):
-            step = (low * slope_high - high * slope_low) / (slope_high - slope_low)
+            secant = (low * slope_high - high * slope_low) / (slope_high - slope_low)
+            step = 0.5 * (low + high) if failed else secant
             found, _, _ = self.advance(before, step, heading)
+            if found is None and failed:
+                return None
+            failed = found is None
             if found is None:
-                return best
-            best = found._replace(is_limit=True)
+                continue
             if abs(found.slope) < LIMIT * scale or high - low < 1e-12:
-                break
+                return found._replace(is_limit=True)
             if found.slope * slope_low > 0:
                 low, slope_low = step, found.slope
                 slope_high = slope_high / 2 if kept == 1 else slope_high
@@ -199,7 +212,7 @@ class _Walk:
                 high, slope_high = step, found.slope
                 slope_low = slope_low / 2 if kept == -1 else slope_low
                 kept = -1
-        return best
+        return None
 
 
 @lru_cache(maxsize=8)

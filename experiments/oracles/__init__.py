@@ -1,7 +1,15 @@
 """Oracles: what answers a run. ``get(name, **parameters)`` makes one; ``oracle(design)`` gives runs.
 
 An oracle is imported when it is asked for, so that listing them needs no JAX. It is built in, registered in this
-process, offered by an installed package (`plugins`), or lies in a file (`files`).
+process, offered by an installed package, or lies in a file.
+
+====================  ================================================================================================
+:mod:`.base`          the protocol, and classes to derive from; :mod:`.functions` makes one of a function
+:mod:`.plugins`       those of installed packages; :mod:`.files` those in files; :mod:`.foreign` what both must be
+:mod:`.checking`      whether one keeps its contract
+:mod:`.recipes`       how another process makes it; :mod:`.record` what is read of it without its code
+:mod:`.command`       any program; :mod:`.equilibrium` what the nonlinear frames of two built-in ones share
+====================  ================================================================================================
 """
 
 from importlib import import_module

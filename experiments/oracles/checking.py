@@ -111,9 +111,13 @@ def _same_when_made_anew(who: str, oracle: Oracle, runs: Runs) -> None:
 
     text = json.dumps(oracle.parameters, sort_keys=True)
     try:
-        again = recipe(oracle).make()
+        how = recipe(oracle)
     except ValueError:
         return  # known to this process alone, as in a notebook
+    try:
+        again = how.make()
+    except ValueError as error:
+        raise AssertionError(f"{who} cannot be made anew of its own parameters: {error}") from None
     _must(json.dumps(again.parameters, sort_keys=True) == text, f"{who} made anew has other parameters")
 
 

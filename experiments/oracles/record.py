@@ -1,7 +1,7 @@
 """What an oracle says of itself, as plain data: enough to report on its answers without its code."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -40,6 +40,7 @@ class Recorded(Oracle):
     """
 
     description: Mapping[str, Any]
+    _said: tuple[FactorSpace, tuple[Response, ...], str, dict[str, Any]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         try:
@@ -57,22 +58,22 @@ class Recorded(Oracle):
     @property
     def factors(self) -> FactorSpace:
         """As they were."""
-        return self._said[0]  # type: ignore[attr-defined]
+        return self._said[0]
 
     @property
     def responses(self) -> tuple[Response, ...]:
         """As they were."""
-        return self._said[1]  # type: ignore[attr-defined]
+        return self._said[1]
 
     @property
     def limits(self) -> str:
         """As it said."""
-        return self._said[2]  # type: ignore[attr-defined]
+        return self._said[2]
 
     @property
     def parameters(self) -> dict[str, Any]:
         """As they were."""
-        return self._said[3]  # type: ignore[attr-defined]
+        return self._said[3]
 
     def evaluate(self, points: NDArray[np.float64]) -> Answers:
         """Refuse: :class:`OracleError`."""

@@ -107,7 +107,7 @@ def _hidden_share(effects: Effects, j: int) -> float:
     """Standard deviation that main effects leave over all of it: each effect c adds c²/4 to the variance."""
     total = float(effects.spread[j]) ** 2
     if effects.holes is not None:
-        return float(effects.holes.left[j]) / float(effects.spread[j]) if total > 0.0 else 0.0
+        return min(float(effects.holes.left[j]) / float(effects.spread[j]), 1.0) if total > 0.0 else 0.0
     explained = 0.25 * float((effects.values[: effects.n_factors, j] ** 2).sum())
     return float(np.sqrt(max(total - explained, 0.0) / total)) if total > 0.0 else 0.0
 

@@ -71,7 +71,8 @@ class Holes:
     n_error, n_dummies : int
         Contrasts left to measure the error, and as many as the whole design has.
     left : ndarray, shape (n_responses,)
-        Standard deviation that main effects leave at the two-level runs.
+        Standard deviation that main effects leave, as it would be over all two-level runs: least squares on fewer runs
+        leaves less, so it is taken per degree of freedom. 0 if there is none.
     """
 
     factors: tuple[str, ...]

@@ -48,7 +48,7 @@ def effects_with_holes(
         names = factors + tuple(STANDS_IN + names[k + i] for i in kept)
         aliases = aliases[:k] + tuple(aliases[k + i] for i in kept)
     centres = runs.values[~corner & runs.ok]
-    remains = np.sqrt(np.mean(fitted.residuals(answers) ** 2, axis=0))
+    contrasts, remains = (len(names) - k, n_dummies), fitted.left_over(answers, n)
     return Effects(
         names,
         k,
@@ -59,5 +59,5 @@ def effects_with_holes(
         columns,
         answers.std(axis=0),
         CentrePoints.against(coefficients[0], centres) if len(centres) else None,
-        Holes.of(factors, corner, runs.ok, columns[here, :k], fitted, (len(names) - k, n_dummies), remains),
+        Holes.of(factors, corner, runs.ok, columns[here, :k], fitted, contrasts, remains),
     )

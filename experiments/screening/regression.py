@@ -50,6 +50,16 @@ class LeastSquares:
         once = columns - self.basis @ (self.basis.T @ columns)
         return once - self.basis @ (self.basis.T @ once)
 
+    def left_over(self, answers: NDArray[np.float64], n_whole: int) -> NDArray[np.float64]:
+        """Standard deviation that the matrix leaves of some answers, as over `n_whole` runs, shape (n_responses,).
+
+        The fewer runs the less is left of them, whatever hides there: so the squares are taken per degree of freedom,
+        times as many of these as `n_whole` runs have. Nothing where no degree of freedom is left.
+        """
+        n, p = self.basis.shape
+        squares = (self.residuals(answers) ** 2).sum(axis=0)
+        return np.sqrt(squares / max(n - p, 1) * (n_whole - p) / n_whole)
+
 
 def rank(matrix: NDArray[np.float64]) -> int:
     """Rank of a matrix of ±1 and ones; 0 if it is empty."""

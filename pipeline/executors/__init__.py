@@ -12,6 +12,5 @@
 from .base import Answered, Batch, Executor
 from .choosing import make
 from .execution import Progress, execute, silent
-from .worker import Recipe
 
-__all__ = ["Answered", "Batch", "Executor", "Progress", "Recipe", "execute", "make", "silent"]
+__all__ = ["Answered", "Batch", "Executor", "Progress", "execute", "make", "silent"]

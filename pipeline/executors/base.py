@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from experiments.oracles import Answers
 from experiments.runs import Status
 
-from .worker import Recipe
+from .worker import SharedOracle
 
 MOST_LOSSES = 3
 """Workers that a point may lose before it is taken to be what ends them."""
@@ -90,15 +90,15 @@ class Elsewhere(Executor):
 
     Parameters
     ----------
-    recipe : Recipe
+    shared : SharedOracle
     batch : int or None
         Points per batch; as many as the oracle answers together, if None.
     note : callable
         Told in a sentence what is worth a line in the log.
     """
 
-    def __init__(self, recipe: Recipe, batch: int | None, note: Callable[[str], None]) -> None:
-        self.recipe, self.batch, self.note = recipe, batch, note
+    def __init__(self, shared: SharedOracle, batch: int | None, note: Callable[[str], None]) -> None:
+        self.shared, self.batch, self.note = shared, batch, note
         self._backlog = self._waiting(())
 
     def size(self, batch: int) -> int:
@@ -106,7 +106,7 @@ class Elsewhere(Executor):
         return self.batch or batch
 
     def _waiting(self, batches: Iterable[Batch]) -> "Backlog":
-        return Backlog(batches, self.recipe.n_responses, self.note)
+        return Backlog(batches, self.shared.n_responses, self.note)
 
 
 class Backlog:

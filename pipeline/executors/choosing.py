@@ -12,7 +12,7 @@ from .base import Executor, cores
 from .dask_cluster import DaskCluster
 from .in_process import InProcess
 from .processes import Processes
-from .worker import Recipe
+from .worker import SharedOracle
 
 
 def make(config: Config, oracle: Oracle, note: Callable[[str], None]) -> Executor:
@@ -34,8 +34,10 @@ def make(config: Config, oracle: Oracle, note: Callable[[str], None]) -> Executo
     table = config.executor
     if table.name == "in_process":
         return InProcess(oracle)
-    recipe = Recipe(f"flexdoce-{uuid4().hex}", oracles.recipe(oracle).make, identity(oracle), len(oracle.responses))
+    shared = SharedOracle(
+        f"flexdoce-{uuid4().hex}", oracles.recipe(oracle).make, identity(oracle), len(oracle.responses)
+    )
     workers = table.workers or cores()
     if table.name == "processes":
-        return Processes(recipe, table.batch, note, workers)
-    return DaskCluster(recipe, table.batch, note, table.address, workers)
+        return Processes(shared, table.batch, note, workers)
+    return DaskCluster(shared, table.batch, note, table.address, workers)

@@ -11,7 +11,7 @@ from typing import Any
 from ..errors import FlexdoceError, InputError
 from . import worker
 from .base import Answered, Batch, Elsewhere
-from .worker import Recipe
+from .worker import SharedOracle
 
 LEAST_AHEAD, MOST_AHEAD, HORIZON = 2, 50, 0.2
 """Batches for every thread of a worker: the one it answers and the next; of quick ones, as many as last 0.2 s."""
@@ -34,7 +34,7 @@ class DaskCluster(Elsewhere):
 
     Parameters
     ----------
-    recipe, batch, note
+    shared, batch, note
         As :class:`.Elsewhere` has them.
     address : str or None
         Of the scheduler, such as ``tcp://head:8786``, or the path of its file, which ends in ``.json``. With None a
@@ -44,9 +44,9 @@ class DaskCluster(Elsewhere):
     """
 
     def __init__(
-        self, recipe: Recipe, batch: int | None, note: Callable[[str], None], address: str | None, workers: int
+        self, shared: SharedOracle, batch: int | None, note: Callable[[str], None], address: str | None, workers: int
     ) -> None:
-        super().__init__(recipe, batch, note)
+        super().__init__(shared, batch, note)
         self.address, self.workers = address, workers
         self._client: Any = None
         self._cluster: Any = None
@@ -100,7 +100,7 @@ class DaskCluster(Elsewhere):
         with suppress(Exception):  # a scheduler that is gone cannot be told
             if client.status == "running":
                 client.cancel(given)
-                client.unregister_worker_plugin(self.recipe.token)
+                client.unregister_worker_plugin(self.shared.token)
         with suppress(Exception):
             client.close(timeout=worker.GRACE)
         if self._cluster is not None:
@@ -138,7 +138,7 @@ class DaskCluster(Elsewhere):
         self._look()
         while len(self._given) < self._ahead * max(self._threads, 1) and (batch := self._backlog.next()) is not None:
             # pure: the cluster keeps no answers, the store does.
-            future = client.submit(worker.answer, self.recipe.token, batch.points, pure=False)
+            future = client.submit(worker.answer, self.shared.token, batch.points, pure=False)
             self._given[future] = batch
             future.add_done_callback(self._done.put)
 
@@ -177,8 +177,8 @@ class DaskCluster(Elsewhere):
                 "scheduler, or leave the address out to have one started here"
             ) from None
         self._seen = time.monotonic()
-        plugin = OraclePlugin(self.recipe, is_ours=self.address is None)
-        self._client.register_plugin(plugin, name=self.recipe.token)
+        plugin = OraclePlugin(self.shared, is_ours=self.address is None)
+        self._client.register_plugin(plugin, name=self.shared.token)
         return self._client
 
     @property

@@ -6,7 +6,7 @@ from typing import Any
 
 from distributed import WorkerPlugin
 
-from .worker import Recipe, forget, prepare
+from .worker import SharedOracle, forget, prepare
 
 
 class OraclePlugin(WorkerPlugin):
@@ -14,20 +14,20 @@ class OraclePlugin(WorkerPlugin):
 
     Parameters
     ----------
-    recipe : Recipe
+    shared : SharedOracle
     is_ours : bool
         Whether the worker was started for this study: Ctrl-C in its terminal is then not its own affair.
     """
 
-    def __init__(self, recipe: Recipe, is_ours: bool) -> None:
-        self.recipe, self.is_ours = recipe, is_ours
+    def __init__(self, shared: SharedOracle, is_ours: bool) -> None:
+        self.shared, self.is_ours = shared, is_ours
 
     def setup(self, worker: Any) -> None:
         """On every worker, before it has any task."""
         if self.is_ours and threading.current_thread() is threading.main_thread():
             signal.signal(signal.SIGINT, signal.SIG_IGN)
-        prepare(self.recipe)
+        prepare(self.shared)
 
     def teardown(self, worker: Any) -> None:
         """When the study is done, or the worker ends."""
-        forget(self.recipe.token)
+        forget(self.shared.token)

@@ -12,7 +12,7 @@ from multiprocessing import get_context
 from ..errors import InputError
 from . import worker
 from .base import Answered, Batch, Elsewhere
-from .worker import Recipe
+from .worker import SharedOracle
 
 AHEAD = 2
 """Batches that a worker has: the one it answers, and the next, so that it never waits for the disk."""
@@ -26,13 +26,13 @@ class Processes(Elsewhere):
 
     Parameters
     ----------
-    recipe, batch, note
+    shared, batch, note
         As :class:`.Elsewhere` has them.
     workers : int
     """
 
-    def __init__(self, recipe: Recipe, batch: int | None, note: Callable[[str], None], workers: int) -> None:
-        super().__init__(recipe, batch, note)
+    def __init__(self, shared: SharedOracle, batch: int | None, note: Callable[[str], None], workers: int) -> None:
+        super().__init__(shared, batch, note)
         self.workers = workers
         self._slots: list[_Slot] = []
 
@@ -60,7 +60,7 @@ class Processes(Elsewhere):
                 self._backlog.lost(slot.given[0][1], slot.name)
                 self._backlog.again(batch for _, batch in list(slot.given)[1:])
                 slot.close(in_haste=True)
-                self._slots[i] = _Slot(self.recipe)
+                self._slots[i] = _Slot(self.shared)
         return [*found, *self._backlog.given_up()]
 
     def close(self, in_haste: bool) -> None:
@@ -83,19 +83,19 @@ class Processes(Elsewhere):
                 if (batch := self._backlog.next()) is None:
                     return
                 if number == len(self._slots):
-                    self._slots.append(_Slot(self.recipe))
+                    self._slots.append(_Slot(self.shared))
                 self._slots[number].give(batch)
 
 
 class _Slot:
     """One worker process: a pool of one, so that when it breaks no other does."""
 
-    def __init__(self, recipe: Recipe) -> None:
-        self.token = recipe.token
+    def __init__(self, shared: SharedOracle) -> None:
+        self.token = shared.token
         # Not a fork: it would inherit the folder's lock and the threads of JAX.
         self.pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=worker.begin)
         with worker.uninterrupted():
-            self.ready: Future[str] = self.pool.submit(worker.prepare, recipe)
+            self.ready: Future[str] = self.pool.submit(worker.prepare, shared)
         self.given: deque[tuple[Future, Batch]] = deque()
 
     @property

@@ -26,15 +26,15 @@ _ORACLES: dict[str, Oracle] = {}
 
 
 @dataclass(frozen=True)
-class Recipe:
-    """How a worker makes the oracle: plain data that goes to other processes and machines.
+class SharedOracle:
+    """A study's oracle as its workers get it: how each makes it, and what it must then be; goes through pickle.
 
     Parameters
     ----------
     token : str
         Names the oracle among those of a worker, which may serve several studies.
     make : callable
-        Gives the oracle; it can be pickled.
+        Gives the oracle, such as the ``make`` of a :class:`experiments.oracles.Recipe`.
     identity : str
         What the oracle must be, as the store writes it.
     n_responses : int
@@ -51,7 +51,7 @@ def here() -> str:
     return f"{socket.gethostname()}:{os.getpid()}"
 
 
-def prepare(recipe: Recipe) -> str:
+def prepare(shared: SharedOracle) -> str:
     """Make the oracle, if that was not done yet; gives who did.
 
     Raises
@@ -59,19 +59,21 @@ def prepare(recipe: Recipe) -> str:
     InputError
         If it cannot be made here, or is not the one that the study has.
     """
-    if recipe.token in _ORACLES:
+    if shared.token in _ORACLES:
         return here()
     try:
-        oracle = recipe.make()
+        oracle = shared.make()
         oracle.prepare()
     except Exception as error:
         raise InputError(f"worker {here()} cannot make the oracle: {error}") from None
-    if identity(oracle) != recipe.identity:
+    if lacking := getattr(oracle, "missing", ""):
+        raise InputError(f"worker {here()} cannot run the oracle: {lacking}")
+    if identity(oracle) != shared.identity:
         raise InputError(
             f"worker {here()} has another version of the oracle {oracle.name!r} than this process; "
             "install the same there as here"
         )
-    _ORACLES[recipe.token] = oracle
+    _ORACLES[shared.token] = oracle
     return here()
 
 

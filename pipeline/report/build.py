@@ -10,9 +10,11 @@ from markupsafe import Markup
 from experiments.designs import METHODS
 
 from ..runner import Outcome
-from . import commanded, comparing, figures, growing, holes, validation, views
+from . import commanded, figures, growing, holes, other_models, validation, views
 
 SPACES = "\n\u00a0\u2009\u202f"
+ROUNDING = 1e-12
+"""Errors over the response's range that are smaller say nothing of the model."""
 _HERE = files("pipeline.report")
 
 
@@ -36,11 +38,15 @@ def rendered(template: str, content: Mapping[str, Any]) -> str:
 
 
 def _content(outcome: Outcome, provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """What the template asks for, section by section; a new section is a function of its own."""
+    sections = (_head, _screening, _fit, _validation, _inverse, _drawing)
+    found = {key: value for section in sections for key, value in section(outcome).items()}
+    return {**found, "provenance": provenance, "script": _read("viewer.js")}
+
+
+def _head(outcome: Outcome) -> dict[str, Any]:
     model, config = outcome.model, outcome.study.config
-    cases = views.shapes(outcome)
-    n = range(len(model.responses))
     return {
-        "script": _read("viewer.js"),
         "config": config,
         "title": config.title or config.name,
         "oracle": outcome.study.oracle,
@@ -50,13 +56,25 @@ def _content(outcome: Outcome, provenance: Mapping[str, Any]) -> dict[str, Any]:
         "headline": views.headline(outcome),
         "shortfalls": outcome.shortfalls,
         "requirements": config.require.model_dump(exclude_none=True),
+        "prefix": outcome.study.export_prefix,
+        "exported": outcome.exported,
+    }
+
+
+def _screening(outcome: Outcome) -> dict[str, Any]:
+    return {
         "activity": views.activity(outcome),
         "adequacy": outcome.adequacy,
         "kept": outcome.kept,
-        "screening_title": METHODS[config.screening.design.method].title,
+        "screening_title": METHODS[outcome.study.config.screening.design.method].title,
         "screening_runs": len(outcome.screening_runs),
         "missing": holes.missing(outcome),
-        "screening_figures": [figures.screening_figure(outcome, j) for j in n],
+        "screening_figures": [figures.screening_figure(outcome, j) for j in range(len(outcome.model.responses))],
+    }
+
+
+def _fit(outcome: Outcome) -> dict[str, Any]:
+    return {
         "fill": views.fill(outcome),
         "design_figure": figures.design_figure(outcome),
         "terms": views.terms(outcome),
@@ -65,25 +83,40 @@ def _content(outcome: Outcome, provenance: Mapping[str, Any]) -> dict[str, Any]:
         "map": views.linear_map(outcome),
         "coefficients": views.coefficients(outcome),
         "published": views.published(outcome),
+    }
+
+
+def _validation(outcome: Outcome) -> dict[str, Any]:
+    model = outcome.model
+    return {
         "validation": validation.error_rows(outcome, model.validation),
-        "at_rounding": max(e.max_relative for e in model.validation) < 1e-12,
+        "at_rounding": max(e.max_relative for e in model.validation) < ROUNDING,
         "intervals": validation.intervals(outcome),
         "validation_failures": outcome.validation_runs.failures(),
-        "validation_figures": [figures.validation_figure(outcome, j) for j in n],
-        "comparisons": comparing.comparisons(outcome),
-        "certificate": views.certificate(model),
-        "boxes": commanded.boxes(outcome, model),
+        "validation_figures": [figures.validation_figure(outcome, j) for j in range(len(model.responses))],
+        "comparisons": other_models.comparisons(outcome),
+    }
+
+
+def _inverse(outcome: Outcome) -> dict[str, Any]:
+    trip = outcome.round_trip
+    return {
+        "certificate": views.certificate(outcome.model),
+        "boxes": commanded.boxes(outcome, outcome.model),
         "command": commanded.boxes(outcome, outcome.commanded),
         "command_verdict": views.certificate(outcome.commanded),
-        "trip": outcome.round_trip,
-        "trip_rows": validation.error_rows(outcome, outcome.round_trip.errors if outcome.round_trip else ()),
+        "trip": trip,
+        "trip_rows": validation.error_rows(outcome, trip.errors if trip else ()),
         "obstacle": outcome.obstacle,
+    }
+
+
+def _drawing(outcome: Outcome) -> dict[str, Any]:
+    cases = views.shapes(outcome)
+    return {
         "shapes": [label for label, _ in cases],
         "shape_figure": figures.shape_figure(cases[0][1]) if cases else "",
         "viewer_data": views.viewer_data(cases),
-        "provenance": provenance,
-        "prefix": outcome.study.export_prefix,
-        "exported": outcome.exported,
     }
 
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..comparison import Found, Row
 from ..grid import Axis, shown
+from ..sweep_rows import Found, Row
 from ..sweeping import Sweep
 from .figures import uri
 

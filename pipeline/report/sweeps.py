@@ -8,9 +8,9 @@ from urllib.parse import quote
 from experiments.runs import Response
 from surrogates import Verdict
 
-from ..comparison import Found, Row, ratio
 from ..config import dump_config
 from ..grid import shown
+from ..sweep_rows import Found, Row, quotient_unit
 from ..sweeping import Sweep
 from .build import rendered
 from .commanded import DIGITS, inwards
@@ -126,7 +126,7 @@ def _slopes(rows: Sequence[Row], first: Found | None) -> dict[str, Any] | None:
         return None
     chosen = dominant(first)
     heads = [
-        {"top": r.symbol, "by": f.name, "unit": ratio(r.shown_unit, f.unit)}
+        {"top": r.symbol, "by": f.name, "unit": quotient_unit(r.shown_unit, f.unit)}
         for r, f in zip(first.responses, (first.factors.factors[j] for j in chosen), strict=True)
     ]
     names = [(r, first.factors.names[j]) for r, j in zip(first.responses, chosen, strict=True)]
@@ -143,7 +143,7 @@ def _stiffness(rows: Sequence[Row], first: Found | None) -> dict[str, Any] | Non
     if first is None or first.stiffness is None:
         return None
     pairs = list(zip(first.factors, first.responses, strict=True))
-    heads = [{"top": f.name, "by": r.symbol, "unit": ratio(f.unit, r.shown_unit)} for f, r in pairs]
+    heads = [{"top": f.name, "by": r.symbol, "unit": quotient_unit(f.unit, r.shown_unit)} for f, r in pairs]
     cells = []
     for row in rows:
         values = row.found.stiffness if row.found and row.found.responses == first.responses else None

@@ -16,6 +16,8 @@ import pipeline.runner
 from experiments import oracles
 from pipeline.cli import main
 from pipeline.config import dump_config, parse_config
+from pipeline.executors.worker import SharedOracle, prepare
+from pipeline.points import identity
 from pipeline.resolving import ready
 
 PAGE = (Path(__file__).parents[2] / "docs" / "command-oracle.md").read_text(encoding="utf-8")
@@ -173,6 +175,14 @@ class TestReady:
         assert float(written["WIDTH"]) == pytest.approx(1000.0 * width, rel=1e-15)
         assert written["THICKNESS"] == f"{1000.0 * thickness:.9e}"
         assert float(written["FORCE"]) == load
+
+    def test_a_program_that_only_the_workers_of_a_cluster_need_is_looked_for_there(self, leaf, tmp_path):
+        changed(leaf, '"{{python}}"', '"no-such-solver"')
+        study = pipeline.resolve(pipeline.load_config(leaf, ["executor.name=dask", "executor.address=tcp://head:1"]))
+        assert ready(study, tmp_path).oracle.name == "command"
+        shared = SharedOracle("token", oracles.recipe(study.oracle).make, identity(study.oracle), 2)
+        with pytest.raises(pipeline.InputError, match=r"^worker .* cannot run the oracle: the program 'no-such"):
+            prepare(shared)
 
     def test_a_program_that_is_not_there_is_refused_before_anything_runs(self, leaf, tmp_path):
         study = pipeline.resolve(pipeline.load_config(changed(leaf, '"{{python}}"', '"no-such-solver"')))

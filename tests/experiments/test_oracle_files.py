@@ -51,6 +51,22 @@ def written(tmp_path):
         del sys.modules[name]
 
 
+def test_one_that_refuses_its_own_parameters_is_told(written):
+    """Workers make it of them."""
+    changing = SPRING.replace(
+        "    @property\n    def factors",
+        """    def __post_init__(self):
+        if self.preload > 0.3:
+            raise ValueError("the preload is 0.3 N at most")
+        object.__setattr__(self, "preload", self.preload + 0.25)
+
+    @property
+    def factors""",
+    )
+    with pytest.raises(AssertionError, match=r"'spring' cannot be made anew of its own parameters: .*0\.3 N at most"):
+        oracles.check_oracle(oracles.get(written(changing), preload=0.1))
+
+
 @pytest.mark.parametrize("what", ["Spring", "spring"], ids=["the class", "the oracle's name"])
 def test_a_file_is_an_oracle(what, written):
     spring = oracles.get(written(SPRING, what), preload=0.1)

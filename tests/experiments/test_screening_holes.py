@@ -273,14 +273,25 @@ class TestVerdicts:
         assert found.next_design is not NextDesign.NONE
         assert found.keep == design.space.names
 
-    def test_the_share_that_main_effects_leave_is_that_of_the_runs_left(self):
+    def test_the_share_that_main_effects_leave_is_no_smaller_for_fewer_runs(self):
+        """Of noise, four of eleven degrees of freedom lie beyond six main effects and a lost run, five in the whole."""
+        design = plackett_burman(12, 6)
+        y = np.random.default_rng(3).normal(size=(400, len(design)))
+        shares = {
+            lost: np.mean([r.hidden**2 for r in screen(holed(design, lost, *y)).adequacy().responses])
+            for lost in ((), (5,), (0, 3, 6))
+        }
+        assert_allclose(shares[(5,)], shares[()], rtol=0.05)
+        assert_allclose(shares[(0, 3, 6)], shares[()], rtol=0.1)
+
+    def test_the_share_that_main_effects_leave_is_taken_per_degree_of_freedom(self):
         design, rng = DESIGNS["plackett_burman"], np.random.default_rng(9)
         y = design.coded[:, 0] + rng.normal(size=12)
         coefficients, _ = by_hand(design, (5,), y)
         rest = np.arange(12) != 5
         left = y[rest] - coefficients[0] - design.coded[rest] @ coefficients[1:]
         found = screen(holed(design, (5,), y)).adequacy().responses[0]
-        assert_allclose(found.hidden, left.std() / y[rest].std(), rtol=1e-12)
+        assert_allclose(found.hidden, np.sqrt((left @ left) / 4 * 5 / 12) / y[rest].std(), rtol=1e-12)
 
 
 class TestRefusals:

@@ -19,8 +19,8 @@ from experiments.oracles import PointOracle
 from experiments.settings import parameter
 from pipeline import InputError
 from pipeline.cli import main
-from pipeline.comparison import ratio
 from pipeline.lock import FolderLock
+from pipeline.sweep_rows import quotient_unit
 from surrogates import load
 from tests.pipeline.cases import CONFIGS, contents, reproducible
 
@@ -187,7 +187,7 @@ class TestTable:
         ("above", "below", "told"), [("m", "N", "m/N"), ("1", "N", "1/N"), ("m", "1", "m"), ("m", "N*m", "m/(N*m)")]
     )
     def test_unit_of_a_quotient(self, above, below, told):
-        assert ratio(above, below) == told
+        assert quotient_unit(above, below) == told
 
 
 class TestPage:

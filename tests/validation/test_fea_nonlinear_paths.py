@@ -1,8 +1,8 @@
 """Verification of paths past limit points: a closed form, and classical frames by an independent solver.
 
 One planar frame of parts that do not touch, since it is compiled once: a path loads one of them and leaves the others
-at rest. Every part is in units of its own, with members about one long and EI one. Williams' toggle is by itself: on
-its steep path the step is halved again and again, and beside the others its second limit point is stepped over.
+at rest. Every part is in units of its own, with members about one long and EI one. Williams' toggle is by itself, for
+its steep path wants another scale of the step.
 """
 
 import json
@@ -13,6 +13,7 @@ import pytest
 
 from experiments.fea import Frame, Load, Material, Member, Section, Support, condense, load_array
 from experiments.fea.nonlinear import NonlinearSolver
+from experiments.fea.path import LIMIT, PathPoint, _Walk
 
 REFERENCE = json.loads((Path(__file__).parents[1] / "reference" / "opensees_frames.json").read_text())
 
@@ -68,6 +69,11 @@ def solver() -> NonlinearSolver:
     return condense(parts(), planar=True, n_steps=32)
 
 
+@pytest.fixture(scope="module")
+def toggled() -> NonlinearSolver:
+    return condense(toggle(), planar=True, n_steps=32)
+
+
 def followed(solver, node, force, **settings):
     return solver.follow(load_array(solver.frame, [[Load(node, (0.0, force, 0.0))]]), **settings)
 
@@ -111,6 +117,11 @@ class TestTwoBarTruss:
         assert (path.equilibria.unstable[outside] == 0).all()
         assert (np.diff(height) < 0).all()
 
+    def test_one_within_the_first_step(self, solver, path):
+        first = followed(solver, "apex", -1.0, step=0.2, most=1)
+        assert first.is_limit.tolist() == [False, True, False]
+        np.testing.assert_allclose(first.level[1], path.level[path.is_limit][0], rtol=1e-9)
+
     def test_levels_end_the_path(self, solver):
         path = followed(solver, "apex", -1.0, step=0.05, levels=(0.0, 1e-3))
         assert path.level[-1] > 1e-3 > path.level[-2]
@@ -131,10 +142,9 @@ class TestClassicalFrames:
     )
 
     @pytest.mark.parametrize(("name", "node", "force", "settings", "tolerance"), CASES)
-    def test_limit_points(self, solver, name, node, force, settings, tolerance):
+    def test_limit_points(self, solver, toggled, name, node, force, settings, tolerance):
         length, bending = UNITS[node]
-        solver = condense(toggle(), planar=True, n_steps=16) if node == "Williams" else solver
-        path = followed(solver, node, -force * length**2 / bending, **settings)
+        path = followed(toggled if node == "Williams" else solver, node, -force * length**2 / bending, **settings)
         expected = np.array(REFERENCE[name]["limit_points"]["values"])
         found = path.is_limit.nonzero()[0][: len(expected)]
         np.testing.assert_allclose(path.level[found] * force, expected[:, 0], rtol=tolerance)
@@ -168,3 +178,42 @@ class TestRefusals:
             solver.follow(load, levels=(0.5, 1.0))
         with pytest.raises(ValueError, match="a path is that of one case, got 2"):
             solver.follow(np.repeat(load, 2, axis=0))
+
+
+class TestNearALimitPoint:
+    """Where the level is out of reach, corrections at a constant level cannot finish a point."""
+
+    def test_it_is_found_and_not_only_approached(self, toggled, monkeypatch):
+        slopes, found = [], _Walk.limit
+
+        def noting(walk: _Walk, before: PathPoint, after: PathPoint, heading) -> PathPoint | None:
+            limit = found(walk, before, after, heading)
+            slopes.append((abs(limit.slope), max(abs(before.slope), abs(after.slope))) if limit else None)
+            return limit
+
+        monkeypatch.setattr(_Walk, "limit", noting)
+        path = followed(toggled, "Williams", -10.0, step=0.01, most=80)
+        assert path.is_limit.sum() == len(slopes) == 2
+        assert all(slope < LIMIT * scale for slope, scale in slopes)
+        assert path.missed == ()
+
+    def test_one_that_is_not_found_is_told(self, toggled, monkeypatch):
+        whole, looking = _Walk.advance, []
+
+        def failing(walk, base, step, heading):
+            return (None, False, None) if looking else whole(walk, base, step, heading)
+
+        def limit(walk, before, after, heading, found=_Walk.limit):
+            looking.append(True)
+            try:
+                return found(walk, before, after, heading)
+            finally:
+                looking.clear()
+
+        monkeypatch.setattr(_Walk, "advance", failing)
+        monkeypatch.setattr(_Walk, "limit", limit)
+        path = followed(toggled, "Williams", -10.0, step=0.01, most=80)
+        assert not path.is_limit.any()
+        assert len(path.missed) == 2
+        assert "between the levels 3.39" in path.missed[0]
+        assert "extremum" in path.missed[0]

@@ -1,4 +1,4 @@
-"""``[[compare]]``: models of other studies, to be shown beside this one's."""
+"""``[[compare]]`` of a config: models of other studies, to be shown beside this one's."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -179,14 +179,14 @@ def _results(found: Found) -> dict[str, Any]:
         told[f"{response.name}_box_relative_to_range"] = found.shares.get(response.name)
     for response, slopes in zip(found.responses, found.slopes, strict=True):
         for factor, slope in zip(found.factors, slopes, strict=True):
-            told[column_label(f"d_{response.name}_d_{factor.name}", ratio(response.unit, factor.unit))] = slope
+            told[column_label(f"d_{response.name}_d_{factor.name}", quotient_unit(response.unit, factor.unit))] = slope
     if (stiffness := found.stiffness) is not None:
         for response, factor, slope in zip(found.responses, found.factors, stiffness, strict=True):
-            told[column_label(f"d_{factor.name}_d_{response.name}", ratio(factor.unit, response.unit))] = slope
+            told[column_label(f"d_{factor.name}_d_{response.name}", quotient_unit(factor.unit, response.unit))] = slope
     return told
 
 
-def ratio(above: str, below: str) -> str:
+def quotient_unit(above: str, below: str) -> str:
     """Unit of a quotient: ``m/N``, ``1/N``, ``m/(N*m)``."""
     if below == "1":
         return above
