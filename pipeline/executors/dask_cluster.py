@@ -93,7 +93,10 @@ class DaskCluster(Elsewhere):
             error = future.exception() if future.status == "error" else None
             if isinstance(error, KilledWorker):
                 self._backlog.lost(self._given.pop(future), str(error.last_worker.address))
-            else:  # cancelled, or lost: so the client tells that its scheduler is gone
+            elif future.status in ("lost", "pending") and self._client.status == "running":
+                # The worker that kept the answer is gone; the scheduler has another one find it.
+                future.add_done_callback(self._told.put)
+            else:  # cancelled: so the client tells that its scheduler is gone
                 self._failure = self._failure or error or self._gone()
             self._done.remove(future)
         self._fetch()

@@ -10,6 +10,7 @@ import time
 from collections import Counter
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -172,6 +173,18 @@ def test_what_others_answered_is_kept_when_one_cannot(tmp_path):
         with pytest.raises(OracleError):
             execute(bench.oracle, bench.design, store, "fit", executor=OneOfTwo(bench.oracle))
         assert len(store.known(store.keys(points))) == 1
+
+
+def test_an_answer_whose_keeper_was_killed_is_waited_for(tmp_path):
+    pytest.importorskip("distributed", reason="NO distributed: the Dask executor was not tried")
+    bench, asked_again = Bench(tmp_path, 'name = "dask"\naddress = "tcp://x:1"'), []
+    cluster = executors.make(bench.config, bench.oracle, bench.notes.append)
+    cluster._client = SimpleNamespace(status="running")
+    # So a future looks between the end of the worker that kept its answer, and the answer of another one.
+    cluster._told.put(SimpleNamespace(status="lost", add_done_callback=asked_again.append))
+    assert not cluster.arrived()
+    assert cluster._failure is None
+    assert len(asked_again) == 1
 
 
 def test_workers_that_have_another_oracle(tmp_path, monkeypatch):
