@@ -29,3 +29,17 @@ def ended_like_ctrl_c() -> Iterator[None]:
 
 def _raise(number: int, frame: FrameType | None) -> None:
     raise KeyboardInterrupt(number)
+
+
+@contextmanager
+def unheard() -> Iterator[None]:
+    """Within, Ctrl-C and these signals do nothing: who is told again while it cleans up is to finish that."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.signal(number, signal.SIG_IGN) for number in (signal.SIGINT, *ENDING)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

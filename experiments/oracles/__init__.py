@@ -18,7 +18,7 @@ from typing import Any
 from ..naming import check_name, suggestion
 from ..settings import build
 from . import files, foreign, plugins
-from .base import Answers, Arrow, JaxOracle, Line, Oracle, OracleError, PointOracle, PublishedMap, Shape, asked
+from .base import Answers, Arrow, JaxOracle, Leave, Line, Oracle, OracleError, PointOracle, PublishedMap, Shape, asked
 from .checking import check_oracle
 from .functions import point_oracle
 from .plugins import GROUP, Offer
@@ -31,6 +31,7 @@ __all__ = [
     "Answers",
     "Arrow",
     "JaxOracle",
+    "Leave",
     "Line",
     "Offer",
     "Oracle",

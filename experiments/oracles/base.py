@@ -21,6 +21,9 @@ CHUNK = 256
 LONGEST_REASON = 300
 """Characters of what somebody's own code raised."""
 
+MOST_KEPT = 10_000
+"""Characters of a reason: one that quotes a whole array would fill store and log."""
+
 
 class Answers(NamedTuple):
     """Raw answers: values (n, n_responses), one status and one reason per point."""
@@ -95,6 +98,10 @@ class Shape:
 
 class OracleError(ValueError):
     """Somebody's own oracle raised what it should not have, or gave what it should not have given: one sentence."""
+
+
+class Leave(SystemExit):
+    """Raised where an oracle is at work in a process that was told to end; what an oracle itself exits with is not."""
 
 
 class Oracle(ABC):
@@ -209,7 +216,7 @@ class Oracle(ABC):
                 bad = [r.name for r, v in zip(self.responses, values[i], strict=True) if not np.isfinite(v)]
                 status[i], reasons[i] = Status.NON_FINITE, f"{', '.join(bad)} not finite"
         values[[s is not Status.OK for s in status]] = np.nan
-        return Answers(values, status, reasons)
+        return Answers(values, status, [r if len(r) <= MOST_KEPT else r[: MOST_KEPT - 1] + "…" for r in reasons])
 
     def interrupt(self) -> None:  # noqa: B027 - what runs in this process ends with it
         """End what other threads run for this oracle outside of this process."""
@@ -222,7 +229,9 @@ def asked(oracle: Oracle, what: str, call: Callable[[], T]) -> T:
     """
     try:
         return call()
-    except Exception as error:
+    except Leave:
+        raise
+    except (Exception, SystemExit) as error:
         if not oracle.origin or isinstance(error, OracleError):
             raise
         raise OracleError(f"oracle {oracle.name!r} ({oracle.origin}): {what} raised {told(error)}") from error
@@ -230,7 +239,11 @@ def asked(oracle: Oracle, what: str, call: Callable[[], T]) -> T:
 
 def told(error: BaseException) -> str:
     """An exception in one line: its kind and the first line of what it says."""
-    said = next((line.strip() for line in str(error).splitlines() if line.strip()), "")
+    try:
+        lines = str(error).splitlines()
+    except Exception:  # somebody's own class of errors may be wrong, too
+        lines = []
+    said = next((line.strip() for line in lines if line.strip()), "")
     said = said if len(said) <= LONGEST_REASON else said[: LONGEST_REASON - 1] + "…"
     return f"{type(error).__name__}: {said}" if said else type(error).__name__
 
@@ -252,7 +265,9 @@ class PointOracle(Oracle):
                 if answer.shape != values[i].shape:
                     raise ValueError(f"respond gave shape {answer.shape}, not {values[i].shape}")
                 values[i] = answer
-            except Exception as error:
+            except Leave:
+                raise
+            except (Exception, SystemExit) as error:  # sys.exit() in somebody's code must not end the study
                 status[i], reasons[i] = Status.CRASHED, f"{type(error).__name__}: {error}"
         return Answers(values, status, reasons)
 

@@ -1,11 +1,13 @@
 """The workers of a Dask cluster: one that is there, by its address, or one that is started on this machine."""
 
 import errno
+import json
 import logging
 import queue
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from ..errors import FlexdoceError, InputError
@@ -51,7 +53,10 @@ class DaskCluster(Elsewhere):
         self._client: Any = None
         self._cluster: Any = None
         self._given: dict[Any, Batch] = {}
-        self._done: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._told: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._done: list[Any] = []
+        self._found: list[Answered] = []
+        self._failure: BaseException | None = None
         self._threads, self._looked, self._seen = 0, 0.0, 0.0
         self._ahead = LEAST_AHEAD
 
@@ -60,36 +65,42 @@ class DaskCluster(Elsewhere):
         self._backlog = self._waiting(batches)
         while True:
             self._fill()
-            found = self.arrived()
+            self._collect()
             self._fill()  # before the answers are stored: workers are not to wait for the disk
-            if found:
+            if found := self.arrived():
                 yield found
-            elif not self._given:
+            if self._failure is not None:  # now that what the others answered is stored
+                raise self._failure
+            if not found and not self._given:
                 return
-            else:
+            if not found:
                 self._wait()
 
     def arrived(self) -> Sequence[Answered]:
         """Fetch what is done."""
+        self._collect()
+        found, self._found = self._found, []
+        return found
+
+    def _collect(self) -> None:
+        """Note what is done, and what failed for good; nothing is forgotten if that is interrupted."""
         from distributed.scheduler import KilledWorker
 
-        done = []
-        while True:
-            with suppress(queue.Empty):
-                done.append(self._done.get_nowait())
-                continue
-            break
-        failed = [future for future in done if future.status != "finished"]
-        for future in failed:
+        with suppress(queue.Empty):
+            while True:
+                self._done.append(self._told.get_nowait())
+        for future in [future for future in self._done if future.status != "finished"]:
             error = future.exception() if future.status == "error" else None
             if isinstance(error, KilledWorker):
                 self._backlog.lost(self._given.pop(future), str(error.last_worker.address))
-            elif error is not None:
-                raise error
-            else:  # cancelled, or lost: so the client tells that its scheduler is gone
-                raise self._gone()
-        good = [future for future in done if future.status == "finished"]
-        return [*self._fetched(good), *self._backlog.given_up()]
+            elif future.status in ("lost", "pending") and self._client.status == "running":
+                # The worker that kept the answer is gone; the scheduler has another one find it.
+                future.add_done_callback(self._told.put)
+            else:  # cancelled: so the client tells that its scheduler is gone
+                self._failure = self._failure or error or self._gone()
+            self._done.remove(future)
+        self._fetch()
+        self._found += self._backlog.given_up()
 
     def close(self, in_haste: bool) -> None:
         """Leave the cluster as it was found, or end the one that was started."""
@@ -107,32 +118,32 @@ class DaskCluster(Elsewhere):
             with suppress(Exception):
                 self._cluster.close(timeout=worker.GRACE)
 
-    def _fetched(self, futures: list[Any]) -> list[Answered]:
-        if not futures:
-            return []
+    def _fetch(self) -> None:
+        if not self._done:
+            return
         try:
-            results = self._client.gather(futures)
+            results = self._client.gather(self._done)
         except FlexdoceError:
             raise
         except Exception as error:
             raise self._gone() from error
-        found = [Answered(self._given.pop(f), *result) for f, result in zip(futures, results, strict=True)]
+        found = [Answered(self._given.pop(f), *result) for f, result in zip(self._done, results, strict=True)]
+        self._found, self._done = self._found + found, []
         slowest = max(len(a.batch.rows) * a.seconds for a in found)
         self._ahead = min(max(LEAST_AHEAD, round(HORIZON / max(slowest, 1e-6))), MOST_AHEAD)
-        return found
 
     def _wait(self) -> None:
         """Until something is done, or there is reason to look at the workers again."""
         try:
-            first = self._done.get(timeout=LOOK_EVERY)
+            first = self._told.get(timeout=LOOK_EVERY)
         except queue.Empty:
             if self._client.status != "running":
                 raise self._gone() from None
         else:
-            self._done.put(first)
+            self._told.put(first)
 
     def _fill(self) -> None:
-        if not self._backlog:
+        if self._failure is not None or not self._backlog:
             return
         client = self._client or self._open()
         self._look()
@@ -140,7 +151,7 @@ class DaskCluster(Elsewhere):
             # pure: the cluster keeps no answers, the store does.
             future = client.submit(worker.answer, self.shared.token, batch.points, pure=False)
             self._given[future] = batch
-            future.add_done_callback(self._done.put)
+            future.add_done_callback(self._told.put)
 
     def _look(self) -> None:
         """How many threads there are now."""
@@ -167,9 +178,8 @@ class DaskCluster(Elsewhere):
         try:
             if self.address is None:
                 self._cluster = LocalCluster(n_workers=self.workers, **LOCAL)
-            is_file = self.address is not None and self.address.endswith(".json")
-            where: Any = {"scheduler_file" if is_file else "address": self._cluster or self.address}
-            self._client = Client(**where, timeout=PATIENCE, set_as_default=False)
+            where = self._cluster or _scheduler(self.address)
+            self._client = Client(where, timeout=PATIENCE, set_as_default=False)
         except (OSError, ValueError) as error:
             self.close(in_haste=True)
             raise InputError(
@@ -189,6 +199,31 @@ class DaskCluster(Elsewhere):
         return ConnectionError(
             errno.ECONNRESET, "the Dask scheduler went away; what was answered is stored", f"executor {self._where}"
         )
+
+
+def _scheduler(address: str | None) -> str:
+    """An address, as it is or from the scheduler's file; looked at first, for a client that is told nonsense hangs.
+
+    Raises
+    ------
+    ValueError
+        If it is none.
+    OSError
+        If the file cannot be read, nor comes for some time.
+    """
+    from distributed.comm.addressing import get_address_host_port
+
+    found, file = str(address), Path(str(address))
+    if file.suffix == ".json":
+        until = time.monotonic() + PATIENCE
+        while not file.exists() and time.monotonic() < until:
+            time.sleep(0.1)
+        try:
+            found = str(json.loads(file.read_text(encoding="utf-8"))["address"])
+        except (ValueError, KeyError, TypeError, RecursionError):
+            raise ValueError("it is not the file of a Dask scheduler") from None
+    get_address_host_port(found)
+    return found
 
 
 def _silence() -> None:

@@ -3,6 +3,7 @@
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from typing import Protocol
 
 import numpy as np
@@ -72,9 +73,11 @@ def execute(
     try:
         for arrived in executor.run(Batch(rows, points[list(rows)]) for rows in chunks):
             keep(arrived)
-    except KeyboardInterrupt:
-        if left := executor.arrived():
-            keep(left)
+    except BaseException as error:
+        # Whatever ended it. Only who was interrupted may still wait, and be told, that the disk refuses.
+        with suppress(*() if isinstance(error, KeyboardInterrupt) else (Exception,)):
+            if left := executor.arrived():
+                keep(left)
         raise
     ordered = [answers[key] for key in keys]
     return Runs(

@@ -14,7 +14,7 @@ from types import FrameType
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.oracles import Answers, Oracle
+from experiments.oracles import Answers, Leave, Oracle
 
 from ..errors import InputError
 from ..points import identity
@@ -64,7 +64,9 @@ def prepare(shared: SharedOracle) -> str:
     try:
         oracle = shared.make()
         oracle.prepare()
-    except Exception as error:
+    except Leave:
+        raise
+    except (Exception, SystemExit) as error:
         raise InputError(f"worker {here()} cannot make the oracle: {error}") from None
     if lacking := getattr(oracle, "missing", ""):
         raise InputError(f"worker {here()} cannot run the oracle: {lacking}")
@@ -90,7 +92,7 @@ def answer(token: str, points: NDArray[np.float64]) -> tuple[Answers, float, str
     began = time.monotonic()
     try:
         answers = _ORACLES[token].answer(points)
-    except SystemExit:
+    except Leave:
         os._exit(1)  # told to end, and what ran for the point has ended; the pool would go on with the next one
     return answers, (time.monotonic() - began) / len(points), here()
 
@@ -105,6 +107,8 @@ def forget(token: str) -> None:
 def begin() -> None:
     """In a new worker process of our own: Ctrl-C is the parent's to see to, and without a parent there is no work."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(signal, "SIGHUP"):  # a closed terminal tells all; who dies of it leaves its programs behind
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
     if hasattr(signal, "pthread_sigmask"):  # blocked while it was started, see `uninterrupted`
         signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
     # Raised where the work is, so that a program that runs for it is ended with it.
@@ -113,7 +117,7 @@ def begin() -> None:
 
 
 def _leave(number: int, frame: FrameType | None) -> None:
-    raise SystemExit(128 + number)
+    raise Leave(128 + number)
 
 
 @contextmanager

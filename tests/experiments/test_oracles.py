@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from experiments import Factor, FactorSpace, Response, Status, oracles
 from experiments.designs import Design
 from experiments.oracles import Answers, Oracle, PointOracle
+from experiments.oracles.base import MOST_KEPT
 
 SPACE = FactorSpace((Factor("a", "N", 0.0, 2.0), Factor("b", "m", 0.0, 2.0)))
 
@@ -168,3 +169,36 @@ def test_cantilever_shape_ends_where_the_response_says():
     rises, runs_out = np.diff(leaf.displacement[-3:, 2]), np.diff(leaf.points[-3:, 0])
     tangent = 1.5 * rises[1] / runs_out[1] - 0.5 * rises[0] / runs_out[0]
     assert_allclose(tangent, slope, rtol=1e-3)
+
+
+class WrongError(Exception):
+    def __str__(self):
+        raise RuntimeError
+
+
+@pytest.mark.parametrize("raised", [SystemExit(0), WrongError()])
+def test_whatever_somebody_s_own_code_raises_is_told(raised):
+    class Own(oracles.Oracle):
+        name, origin = "own", "own.py"
+        factors, responses = FactorSpace((Factor("a", "N", 0.0, 1.0),)), (Response("u", "m"),)
+
+        def evaluate(self, points):
+            raise raised
+
+    with pytest.raises(oracles.OracleError, match=f"evaluate raised {type(raised).__name__}"):
+        Own().answer(np.zeros((1, 1)))
+
+
+@pytest.mark.parametrize(("raised", "reason"), [(SystemExit(0), "SystemExit: 0"), (ValueError("x" * 10**6), "ValueEr")])
+def test_a_point_whose_code_exits_or_tells_a_novel_fails(raised, reason):
+    class Own(oracles.PointOracle):
+        name = "own"
+        factors, responses = FactorSpace((Factor("a", "N", 0.0, 1.0),)), (Response("u", "m"),)
+
+        def respond(self, point):
+            raise raised
+
+    answers = Own().answer(np.zeros((1, 1)))
+    assert answers.status == [Status.CRASHED]
+    assert answers.reasons[0].startswith(reason)
+    assert len(answers.reasons[0]) <= MOST_KEPT

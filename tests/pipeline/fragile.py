@@ -3,7 +3,9 @@
 import json
 import os
 import signal
+import threading
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
@@ -16,6 +18,9 @@ from experiments.settings import parameter
 
 NOTES, KILL_ONCE, POISON, HOLD, SPOILT = "notes", "kill-once", "poison", "hold", "spoilt"
 """Files of its folder: who was asked; the next one asked ends; large points end; nobody answers; it cannot be made."""
+
+STILLBORN, SLOW, LINGER = "stillborn", "slow", "linger"
+"""Further ones: the next worker that is made ends; none is ever ready; a thread is left that never ends."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +41,17 @@ class Fragile(PointOracle):
         return Response("u", "m"), Response("v", "m")
 
     def prepare(self) -> None:
-        if (Path(self.folder) / SPOILT).exists() and os.getpid() != int(os.environ["FRAGILE_PARENT"]):
+        folder = Path(self.folder)
+        if os.getpid() == int(os.environ.get("FRAGILE_PARENT", os.getpid())):
+            return
+        if (folder / SPOILT).exists():
             raise ValueError("no licence on this machine")
+        with suppress(FileNotFoundError):
+            (folder / STILLBORN).unlink()
+            os.kill(os.getpid(), signal.SIGKILL)
+        while (folder / SLOW).exists():
+            (folder / SLOW).write_text(str(os.getpid()))
+            time.sleep(0.05)
 
     def respond(self, point: np.ndarray) -> tuple[float, ...]:
         folder = Path(self.folder)
@@ -45,6 +59,8 @@ class Fragile(PointOracle):
             notes.write(json.dumps([os.getpid(), point.tolist()]) + "\n")
         if is_fatal(folder, point):
             os.kill(os.getpid(), signal.SIGKILL)
+        if (folder / LINGER).exists():
+            threading.Thread(target=time.sleep, args=(60.0,)).start()
         time.sleep(self.pause)
         while (folder / HOLD).exists():
             time.sleep(0.005)

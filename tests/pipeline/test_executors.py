@@ -10,20 +10,23 @@ import time
 from collections import Counter
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from experiments import Status, oracles
 from experiments.designs import Sobol
+from experiments.oracles import OracleError
 from pipeline import InputError, executors, resolve
 from pipeline.cli import main
 from pipeline.config import load_config, parse_config
-from pipeline.executors import execute
+from pipeline.executors import Answered, execute
+from pipeline.executors.in_process import InProcess
 from pipeline.executors.processes import AHEAD
 from pipeline.points import PointStore
 from tests.pipeline.cases import reproducible
-from tests.pipeline.fragile import HOLD, KILL_ONCE, POISON, SPOILT, asked
+from tests.pipeline.fragile import HOLD, KILL_ONCE, LINGER, POISON, SLOW, SPOILT, STILLBORN, asked
 
 ROOT = Path(__file__).parents[2]
 SOURCE = Path(__file__).with_name("fragile.py")
@@ -120,6 +123,68 @@ def test_workers_that_cannot_make_the_oracle(name, tmp_path):
     (tmp_path / SPOILT).touch()
     with pytest.raises(InputError, match=r"worker .*:\d+ cannot make the oracle: no licence on this machine"):
         bench.run()
+
+
+@POSIX
+def test_a_worker_that_is_killed_before_it_is_ready_costs_no_point(tmp_path, monkeypatch):
+    monkeypatch.setattr("pipeline.executors.worker.GRACE", 0.2)
+    bench = Bench(tmp_path, 'name = "processes"\nworkers = 1')
+    for name in (STILLBORN, LINGER):  # and one whose oracle leaves a thread behind does not keep the study waiting
+        (tmp_path / name).touch()
+    began = time.monotonic()
+    runs = bench.run()
+    assert runs.ok.all()
+    assert bench.notes == ["a worker was killed before it was ready: another one is started"]
+    assert time.monotonic() - began < 40.0
+    assert not any(is_running(pid) for pid, _ in asked(tmp_path))
+
+
+@POSIX
+def test_ctrl_c_before_any_worker_is_ready(tmp_path):
+    bench = Bench(tmp_path, 'name = "processes"\nworkers = 1')
+    (tmp_path / SLOW).touch()
+
+    def stop():
+        until((tmp_path / SLOW).read_text)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=stop, daemon=True).start()
+    with pytest.raises(KeyboardInterrupt):
+        bench.run()
+    assert not is_running(int((tmp_path / SLOW).read_text()))
+
+
+def test_what_others_answered_is_kept_when_one_cannot(tmp_path):
+    bench = Bench(tmp_path, "")
+    points = bench.design.physical
+
+    class OneOfTwo(InProcess):
+        """Batches of two workers: the second fails while the answer of the first has come in."""
+
+        def run(self, batches):
+            self.found = [Answered(next(iter(batches)), self.oracle.answer(points[:1]), 0.0, "a:1")]
+            raise OracleError("b:2 cannot")
+            yield
+
+        def arrived(self):
+            return self.found
+
+    with PointStore(tmp_path / "points.sqlite", bench.oracle) as store:
+        with pytest.raises(OracleError):
+            execute(bench.oracle, bench.design, store, "fit", executor=OneOfTwo(bench.oracle))
+        assert len(store.known(store.keys(points))) == 1
+
+
+def test_an_answer_whose_keeper_was_killed_is_waited_for(tmp_path):
+    pytest.importorskip("distributed", reason="NO distributed: the Dask executor was not tried")
+    bench, asked_again = Bench(tmp_path, 'name = "dask"\naddress = "tcp://x:1"'), []
+    cluster = executors.make(bench.config, bench.oracle, bench.notes.append)
+    cluster._client = SimpleNamespace(status="running")
+    # So a future looks between the end of the worker that kept its answer, and the answer of another one.
+    cluster._told.put(SimpleNamespace(status="lost", add_done_callback=asked_again.append))
+    assert not cluster.arrived()
+    assert cluster._failure is None
+    assert len(asked_again) == 1
 
 
 def test_workers_that_have_another_oracle(tmp_path, monkeypatch):
@@ -312,3 +377,21 @@ def test_nobody_at_the_address(tmp_path, monkeypatch):
     bench = Bench(tmp_path, 'name = "dask"\naddress = "tcp://127.0.0.1:9"')
     with pytest.raises(InputError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:9"):
         bench.run()
+
+
+@pytest.mark.parametrize(
+    ("address", "sentence"),
+    [
+        ("x", "missing port number"),
+        ("tcp://", "missing port number"),
+        ("http://localhost:1", "unknown address scheme 'http'"),
+        ("garbage.json", "it is not the file of a Dask scheduler"),
+        ("missing.json", "No such file"),
+    ],
+)
+def test_an_address_that_is_none(address, sentence, tmp_path, monkeypatch):
+    monkeypatch.setattr("pipeline.executors.dask_cluster.PATIENCE", 0.2)
+    monkeypatch.chdir(tmp_path)
+    Path("garbage.json").write_text("{}", encoding="utf-8")
+    with pytest.raises(InputError, match=f"no Dask scheduler answers at {address} .*{sentence}"):
+        Bench(tmp_path, f'name = "dask"\naddress = "{address}"').run()
