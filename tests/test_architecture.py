@@ -156,6 +156,7 @@ MAY_READ = MAY_WRITE | {
     "pipeline.database",  # what file system it is on
     "pipeline.config",  # the config
     "pipeline.report.build",  # its own template
+    "pipeline.executors.dask_cluster",  # the scheduler's file
     "surrogates.artefact",  # load("model.json")
     "experiments.oracles.hexflex",  # its own geometry
     "surrogates.exports.fmi.targets",  # the standard's headers
