@@ -90,6 +90,7 @@ class PointStore:
         self._worker = f"{socket.gethostname()}:{os.getpid()}"
         try:
             self._db = database.prepared(path, self._connect)
+            self._file = path.stat()
         except (sqlite3.DatabaseError, OSError) as error:
             raise InputError(f"cannot use the point store {path}: {error}; move it away or use --fresh") from None
 
@@ -216,11 +217,23 @@ class PointStore:
         return Answer(numbers, status, row.reason)
 
     def _write(self, batch: Sequence[Row]) -> None:
+        if not self._is_there():
+            raise InputError(
+                f"the point store {self.path} was removed or replaced while the run was at work: what was stored since "
+                "is lost with it; run the same command again"
+            )
         try:
             if batch:
                 database.write(self._db, batch)
         except sqlite3.DatabaseError as error:
             raise database.translated(error, self.path) from None
+
+    def _is_there(self) -> bool:
+        """Whether the file that is open is the one at its place: a removed one takes answers, and keeps none."""
+        try:
+            return os.path.samestat(self._file, self.path.stat())
+        except OSError:
+            return False
 
     def _connect(self) -> Any:
         return database.connect(self.path)

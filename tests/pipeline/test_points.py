@@ -348,3 +348,25 @@ class TestCache:
         assert main(["run", str(config), "--out", str(tmp_path / "b"), *more]) == 0
         assert len(counted.asked) == n
         assert (tmp_path / "cache" / "points.sqlite").is_file()
+
+
+class TestRemovedStore:
+    @pytest.mark.parametrize("replaced", [False, True], ids=["removed", "replaced"])
+    def test_is_told_at_once(self, replaced, tmp_path, counted):
+        """SQLite would go on writing to a file that nobody can find any more."""
+        oracle = oracles.get("counted")
+        with PointStore(tmp_path / "p.sqlite", oracle) as store:
+            (tmp_path / "p.sqlite").unlink()
+            if replaced:
+                (tmp_path / "p.sqlite").write_bytes(b"")
+            with pytest.raises(InputError, match="was removed or replaced while the run was at work"):
+                store.add(["key"], np.zeros((1, 4)), answers(Status.OK))
+
+    def test_a_cache_is_done_without(self, tmp_path, counted):
+        oracle, told = oracles.get("counted"), []
+        cache = PointStore(tmp_path / "c.sqlite", oracle, shared=True)
+        with PointStore(tmp_path / "p.sqlite", oracle, cache) as store:
+            store.warn = told.append
+            (tmp_path / "c.sqlite").unlink()
+            assert store.add(["key"], np.zeros((1, 4)), answers(Status.OK))["key"].status is Status.OK
+        assert ["the cache is left out" in sentence for sentence in told] == [True]
