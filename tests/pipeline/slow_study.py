@@ -6,6 +6,7 @@ every job is a fork. Line by line it answers with the process id as a job begins
 
 import json
 import os
+import signal
 import sys
 import time
 from dataclasses import dataclass
@@ -85,6 +86,9 @@ def job(folder: str, notes: str, arguments: list[str]) -> int:
 
 def serve() -> None:
     """Fork once per line."""
+    # What runs the tests in the background may have told its children to ignore these.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
     oracles.register(Slow)
     import pipeline.cli
     import pipeline.runner  # noqa: F401
