@@ -2,11 +2,16 @@
 
 import os
 import shutil
+import signal
 import tempfile
 
 import pytest
 
 from pipeline.compilation import FOLDER, SHORTEST
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    # Started in the background of a script: a test that sends Ctrl-C, to itself or to a child, would wait for ever.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 LONGEST = (
     "experiments/test_oracle_hexflex_nonlinear.py",

@@ -106,17 +106,15 @@ class DaskCluster(Elsewhere):
         """Leave the cluster as it was found, or end the one that was started."""
         client, self._client = self._client, None
         given, self._given = list(self._given), {}
-        if client is None:
-            return
+        cluster, self._cluster = self._cluster, None
         with suppress(Exception):  # a scheduler that is gone cannot be told
-            if client.status == "running":
+            if client is not None and client.status == "running":
                 client.cancel(given)
                 client.unregister_worker_plugin(self.shared.token)
-        with suppress(Exception):
-            client.close(timeout=worker.GRACE)
-        if self._cluster is not None:
+        for one in (client, cluster):
             with suppress(Exception):
-                self._cluster.close(timeout=worker.GRACE)
+                if one is not None:
+                    one.close(timeout=worker.GRACE)
 
     def _fetch(self) -> None:
         if not self._done:

@@ -294,9 +294,7 @@ def same(expected: dict[str, bytes], folder: Path) -> bool:
 def begun(config: Path, folder: Path):
     """``flexdoce run`` in a process group of its own."""
     arguments = ["run", str(config), "--out", str(folder / "run")]
-    # What runs the tests in the background may have told its children to ignore Ctrl-C.
-    ready = "import signal, sys\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
-    code = f"{ready}from pipeline.cli import main\nsys.exit(main({arguments!r}))"
+    code = f"import sys\nfrom pipeline.cli import main\nsys.exit(main({arguments!r}))"
     process = subprocess.Popen(
         [sys.executable, "-c", code], cwd=ROOT, start_new_session=True, stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": str(ROOT)},
