@@ -197,6 +197,8 @@ def _sentence(error: ValidationError) -> str:
         allowed = "should be a finite number, a text, true or false"
     if where == "version":
         allowed = "should be 1"
+    if where == "compare":
+        allowed = "should be a list of tables, each headed [[compare]]"
     if "pattern" in (first.get("ctx") or {}):
         allowed = "should be letters, digits and underscores, starting with a letter"
     return f"{where} {allowed}, got {_shown(first['input'])}"

@@ -133,7 +133,8 @@ def oracle_class(name: str) -> type[Oracle]:
         return getattr(import_module(module, __package__), attribute)
     offered = [offer for offer in offers() if offer.name == name]
     if not offered:
-        raise ValueError(f"unknown oracle {name!r}{suggestion(name, (*names(), *CONFIGURED))}")
+        file = "; an oracle in a file goes by path/to/file.py:name" if "." in name or "/" in name else ""
+        raise ValueError(f"unknown oracle {name!r}{suggestion(name, (*names(), *CONFIGURED))}{file}")
     return plugins.load(offered[0])
 
 

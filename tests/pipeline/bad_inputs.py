@@ -149,6 +149,14 @@ BAD = [
     ),
     # Oracles.
     Bad("unknown oracle", 'name = "bad"\n[oracle]\nname = "cantilver"\n', r"'cantilver'; did you mean 'cantilever'\?"),
+    Bad(
+        "a file without .py",
+        'name = "bad"\noracle = "spring.tip"\n',
+        r"an oracle in a file goes by path/to/file\.py:name",
+    ),
+    appended(
+        "one [compare]", '[compare]\nname = "b"\nmodel = "b.json"', r"a list of tables, each headed \[\[compare\]\]"
+    ),
     Bad("unknown oracle as a text", 'name = "bad"\noracle = "cantilver"\n', r"did you mean 'cantilever'\?"),
     *(
         Bad(f"oracle file {name}", f"name = 'bad'\noracle = '{name}'\n", match)
