@@ -195,7 +195,8 @@ class CommandOracle(Oracle):
                 folder.remove()
         if kept and not good:
             is_known = self._place is not None and self._place == program.work_folder
-            where = folder.path.name if is_known else folder.path
+            # Without its number: an interrupted try leaves a folder, too, and the reason has to be the same bytes.
+            where = f"{self._folder_name(point)}-*" if is_known else folder.path
             verdict = verdict._replace(reason=f"{verdict.reason} (folder {where})")
         return verdict
 
