@@ -13,6 +13,7 @@ from experiments.naming import column_label
 from experiments.runs import Response
 from surrogates import ResponseError, Surrogate, Verdict
 from surrogates.certificate import Certificate
+from surrogates.stiffness import held_stiffness
 
 from .grid import Member, shown
 from .runner import Outcome
@@ -102,10 +103,7 @@ class Found:
 
         Shape (n_factors,); None where there is no inverse.
         """
-        scaled = self.slopes * self.factors.half_range
-        if scaled.shape[0] != scaled.shape[1] or np.linalg.matrix_rank(_balanced(scaled)) < len(scaled):
-            return None
-        return np.asarray(np.diag(np.linalg.inv(self.slopes)), dtype=np.float64)
+        return held_stiffness(self.slopes, self.factors.half_range)
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,9 +189,3 @@ def quotient_unit(above: str, below: str) -> str:
     if below == "1":
         return above
     return f"{above}/({below})" if any(sign in below for sign in "*/· ") else f"{above}/{below}"
-
-
-def _balanced(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rows over their largest entry, so that units do not matter to the rank."""
-    largest = np.abs(matrix).max(axis=1, keepdims=True)
-    return matrix / np.where(largest > 0.0, largest, 1.0)
